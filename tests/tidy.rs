@@ -34,7 +34,7 @@ const LAYERS: [(&str, &[&str]); 14] = [
     ("experiment", &["sim", "storage", "scenarios", "expert", "planners", "policy", "onnx"]),
     ("evaluation", &["sim", "storage", "planners", "policy", "experiment"]),
     ("report", &["sim", "storage", "policy", "experiment", "evaluation"]),
-    ("benchmark", &["sim", "scenarios", "expert", "policy", "experiment", "evaluation"]),
+    ("benchmark", &["sim", "storage", "scenarios", "expert", "policy", "experiment", "evaluation"]),
     ("torture", &["storage"]),
     (
         "xtask",

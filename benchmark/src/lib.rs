@@ -6,6 +6,7 @@
 //! | [`evaluating`] | `evaluate` on one thread and on two |
 //! | [`maps`] | building a map, starting an episode |
 //! | [`network`] | answers and training |
+//! | [`page`] | figures as tables in a page |
 //! | [`peers`] | other simulators and libraries in the same run |
 //!
 //! A figure is the median of several measurements, each long enough to leave the start behind, with the least and the
@@ -15,6 +16,7 @@ pub mod driving;
 pub mod evaluating;
 pub mod maps;
 pub mod network;
+pub mod page;
 pub mod peers;
 
 use std::time::{Duration, Instant};
