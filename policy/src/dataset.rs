@@ -12,5 +12,6 @@ mod tick;
 pub use aggregate::{Dataset, Split, ValidationSplit};
 pub use collection::{Collection, Effort, EpisodeRecord};
 pub use round::Round;
+pub(crate) use round::kept_places;
 pub use sample::Sample;
 pub use tick::Tick;

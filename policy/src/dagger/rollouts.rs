@@ -6,7 +6,7 @@ use crate::dagger::disturbance::Disturbance;
 use crate::dagger::gated_collector::{CollectorSeat, GatedCollector, Keep};
 use crate::dagger::learned::Learned;
 use crate::dagger::settings::DaggerSettings;
-use crate::dataset::{Collection, Effort, EpisodeRecord, Round, Tick};
+use crate::dataset::{Collection, Effort, EpisodeRecord, Round, Tick, kept_places};
 use crate::decision_rule::PAPER_TAU;
 use crate::decision_rule::{DecisionRule, GateContext};
 use rayon::prelude::*;
@@ -197,15 +197,12 @@ impl Collected {
         if at_most == 0 || self.round.samples.len() <= at_most {
             return self;
         }
-        let count = self.round.samples.len();
-        // Of the first so many samples: the i-th that stays is that in place i · count / at_most.
-        let stay_of = |first: usize| (first * at_most).div_ceil(count);
+        let mut places = kept_places(self.round.samples.len(), at_most).peekable();
         let mut episodes = self.episodes;
         let mut end = 0;
         for record in &mut episodes {
-            let begin = end;
             end += record.samples;
-            record.samples = stay_of(end) - stay_of(begin);
+            record.samples = std::iter::from_fn(|| places.next_if(|&place| place < end)).count();
         }
         Self { round: self.round.thinned(at_most), episodes, ..self }
     }

@@ -32,11 +32,7 @@ impl Round {
     /// At most this many of the samples, spread evenly over all of them; 0 = all.
     #[must_use]
     pub(crate) fn thinned(&self, at_most: usize) -> Self {
-        let count = self.samples.len();
-        if at_most == 0 || count <= at_most {
-            return self.clone();
-        }
-        let places = || (0..at_most).map(|i| i * count / at_most);
+        let places = || kept_places(self.samples.len(), at_most);
         Self {
             samples: places().map(|place| self.samples[place]).collect(),
             ticks: places().filter_map(|place| self.ticks.get(place).copied()).collect(),
@@ -49,6 +45,12 @@ impl Round {
         let each = self.augmentations_each();
         &self.noise_augmentations[sample * each..(sample + 1) * each]
     }
+}
+
+/// The places of those of `count` samples that stay where at most so many are wanted, spread evenly; 0 = all.
+pub(crate) fn kept_places(count: usize, at_most: usize) -> impl Iterator<Item = usize> {
+    let stay = if at_most == 0 { count } else { count.min(at_most) };
+    (0..stay).map(move |i| i * count / stay)
 }
 
 #[cfg(test)]
