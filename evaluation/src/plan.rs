@@ -73,14 +73,19 @@ fn check_tables(drivers: usize, kinds: usize, levels: usize) -> anyhow::Result<(
 
 #[cfg(test)]
 mod tests {
-    use super::check_tables;
+    use super::*;
+    use experiment::settings::NoiseChoice;
 
     /// After days of driving the tables were written, and could not be read for the report.
     #[test]
     fn tables_that_could_not_be_read_again_are_refused_before_anything_is_driven() {
-        assert!(check_tables(50, 800, 1).is_ok());
-        let refused = check_tables(50, 1000, 1).unwrap_err().to_string();
-        assert!(refused.contains("some 300 MB, and at most 256 MB are read again"), "{refused}");
-        assert!(check_tables(50, 300, 3).is_err(), "levels of noise count");
+        let mut settings = Settings::preset("default").unwrap();
+        settings.evaluation.noise = vec![NoiseChoice::Paper; 100];
+        let lots = Lot::parse_all(&["test:12:all"], &settings.episode.vehicle).unwrap();
+        let drivers = vec![NamedDriver::expert(&settings.expert); 31];
+        let plan = Plan { settings: &settings, drivers: &drivers[..30], lots: &lots, compare_with: 0, shard: None };
+        assert!(plan.check().is_ok(), "12 kinds and all together and unseen, 6 kB each, are 252 MB");
+        let refused = Plan { drivers: &drivers, ..plan }.check().unwrap_err().to_string();
+        assert!(refused.contains("31 drivers on 12 kinds") && refused.contains("some 260 MB"), "{refused}");
     }
 }

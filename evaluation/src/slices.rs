@@ -80,17 +80,17 @@ impl Slice {
 mod tests {
     use super::*;
 
-    /// Each lot from a file is a group. What slices there are, and which groups they hold, took as long as the square of their
-    /// number: minutes of so many.
     #[test]
-    fn slices_of_very_many_lots_take_no_time() {
-        const LOTS: u32 = 200_000;
-        let group = |index: u32| LotGroup { name: format!("lot {index}"), lots: 1, is_trained_on: index == 7 };
-        let groups: Vec<LotGroup> = (0..LOTS).map(group).collect();
-        let slices = Slice::all_of(&groups);
+    fn every_group_is_a_slice_and_those_that_are_unseen_and_all_are() {
+        let group = |index: u32| LotGroup { name: format!("lot {index}"), lots: 1, is_trained_on: index == 2 };
+        let slices = Slice::all_of(&(0..5).map(group).collect::<Vec<_>>());
         let [first, .., unseen, all] = &slices[..] else { panic!("{} slices", slices.len()) };
-        assert_eq!((slices.len(), first.groups(), &*first.label), (LOTS as usize + 2, &[0][..], "lot 0"));
-        assert!((0..LOTS).all(|group| all.contains(group) && unseen.contains(group) == (group != 7)));
-        assert_eq!((unseen.kind, all.kind, all.contains(LOTS)), (SliceKind::Unseen, SliceKind::All, false));
+        assert_eq!((slices.len(), first.kind, first.groups(), &*first.label), (7, SliceKind::Group, &[0][..], "lot 0"));
+        assert_eq!((unseen.kind, unseen.groups()), (SliceKind::Unseen, &[0, 1, 3, 4][..]));
+        assert_eq!((all.kind, all.groups()), (SliceKind::All, &[0, 1, 2, 3, 4][..]));
+        let held: Vec<u32> = (0..6).filter(|&group| unseen.contains(group)).collect();
+        assert_eq!(held, unseen.groups());
+        assert_eq!(Slice::all_of(&[group(0)]).len(), 1, "one group is all of them");
+        assert_eq!(Slice::all_of(&[group(0), group(2)]).len(), 3, "one unseen group has a slice already");
     }
 }

@@ -180,8 +180,10 @@ fn length(text: &str) -> usize {
     text.chars().filter(|c| !('\u{300}'..='\u{36f}').contains(c)).count()
 }
 
-/// What [`escaped`] puts a backslash before, except for bars.
-const ESCAPED: [char; 13] = ['\\', '`', '*', '[', ']', '<', '~', '&', '!', '@', '_', ':', '.'];
+/// What [`escaped`] always puts a backslash before, beside bars …
+const ALWAYS: [char; 10] = ['\\', '`', '*', '[', ']', '<', '~', '&', '!', '@'];
+/// … and now and then.
+const SOMETIMES: [char; 3] = ['_', ':', '.'];
 
 /// A line without the backslashes of [`escaped`]; bars keep theirs, by which they are told from the edges of cells. A cell is
 /// filled up by what it loses, so that columns stay below each other.
@@ -196,7 +198,7 @@ fn unescaped(line: &str) -> String {
                 out.push_str("\\|");
                 rest.next();
             }
-            ('\\', Some(next)) if ESCAPED.contains(&next) => {
+            ('\\', Some(next)) if ALWAYS.contains(&next) || SOMETIMES.contains(&next) => {
                 out.push(next);
                 lost += 1;
                 rest.next();
@@ -222,7 +224,7 @@ pub fn escaped(text: &str) -> String {
         // Within a word, as in `my_lot`, an underscore means nothing.
         let is_inner = |c: Option<char>| c.is_some_and(char::is_alphanumeric);
         let is_special = match letter {
-            '\\' | '`' | '*' | '[' | ']' | '<' | '|' | '~' | '&' | '!' | '@' => true,
+            _ if letter == '|' || ALWAYS.contains(&letter) => true,
             '_' => !(is_inner(before) && is_inner(rest.peek().copied())),
             // What some renderers make links of by themselves; a driver's path has one slash.
             ':' => rest.clone().take(2).eq(['/', '/']),
@@ -299,9 +301,9 @@ here.";
 | _mine_ |      |
 | expert | 0.01 |";
         assert_eq!(fit(&table.to_string(), 17), narrow);
-        let name = "_x_ *y* `z` <w> a|b c\\d";
+        let name = "_x_ *y* `z` <w> a|b c\\d ~!@[&] www.a.b https://c";
         let sentence = format!("differs \\* from {}", escaped(name));
-        assert_eq!(fit(&sentence, 100), "differs * from _x_ *y* `z` <w> a\\|b c\\d");
+        assert_eq!(fit(&sentence, 100), format!("differs * from {}", name.replace('|', "\\|")));
     }
 
     /// `trained:default` was broken behind its `d`, and `reversals` before its last letter, where the pieces had room.
