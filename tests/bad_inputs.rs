@@ -20,7 +20,7 @@ use sim::map::Map;
 use sim::scenario::Scenario;
 use sim::seed::{RootSeed, Stream};
 #[cfg(unix)]
-use sim::validate::is_invisible;
+use sim::validate::is_hidden;
 use sim::vehicle::VehicleSettings;
 #[cfg(unix)]
 use std::collections::BTreeMap;
@@ -957,7 +957,10 @@ fn whole_commands_refuse_within_their_means_and_leave_nothing() {
         assert!(stderr.to_lowercase().contains(&expected.to_lowercase()), "{shown:?} lacks {expected:?}:\n{stderr}");
         let errors = stderr.lines().filter(|line| line.starts_with("error: ")).count();
         assert!(errors == 1 && !stderr.contains("panicked") && stderr.len() < ERROR_MAX, "{shown:?}:\n{stderr}");
-        assert!(!stderr.contains(is_invisible), "{shown:?} quotes what nobody sees:\n{stderr:?}");
+        assert!(
+            !stderr.contains(|letter| letter != '\n' && is_hidden(letter)),
+            "{shown:?} quotes what nobody sees:\n{stderr:?}"
+        );
         let after = content_in(&folder);
         assert!(after.keys().eq(before.keys()), "{shown:?} leaves something: {:?}", after.keys());
         assert!(after == before, "{shown:?} changes a file");

@@ -17,7 +17,7 @@ use experiment::drivers::{DriverSpec, NamedDriver};
 use glob::{MatchOptions, Pattern};
 use sim::limits::NAME_CHARS_MAX;
 use sim::seed::RootSeed;
-use sim::validate::is_invisible;
+use sim::validate::is_hidden;
 use std::collections::BTreeMap;
 
 /// Fewer trainings say nothing about others (chosen).
@@ -110,7 +110,7 @@ pub fn assign(methods: &Methods, drivers: &mut [NamedDriver]) -> anyhow::Result<
 fn check_name(method: &str) -> anyhow::Result<()> {
     ensure!(!method.trim().is_empty(), "write a name before the =, as in mine=run:runs/mine-s*");
     ensure!(method.chars().count() <= NAME_CHARS_MAX, "shorten its name to at most {NAME_CHARS_MAX} characters");
-    let is_other = |&letter: &char| letter.is_control() || is_invisible(letter) || "|`*<>[]\\".contains(letter);
+    let is_other = |&letter: &char| is_hidden(letter) || "|`*<>[]\\".contains(letter);
     let other = method.chars().find(is_other);
     ensure!(other.is_none(), "{:?} cannot be in its name, which stands in tables", other.unwrap_or_default());
     Ok(())

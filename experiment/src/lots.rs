@@ -10,7 +10,7 @@ use scenarios::{LoadError, LotSpec};
 use sim::limits::LOTS_MAX;
 use sim::scenario::{Direction, NoiseLevel, Scenario};
 use sim::seed::RootSeed;
-use sim::validate::{is_invisible, validate};
+use sim::validate::{is_hidden, validate};
 use sim::vehicle::VehicleSettings;
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
@@ -117,7 +117,7 @@ impl Lot {
             ensure!(named.insert(spec), "lot {spec:?} is named twice; name it once");
             let suite = scenarios::suite(spec)?;
             // Replay keys name its file, and rows of tables hold them.
-            if let Some(letter) = spec.chars().find(|&letter| letter.is_control() || is_invisible(letter)) {
+            if let Some(letter) = spec.chars().find(|&letter| is_hidden(letter)) {
                 bail!("lot {spec:?} contains {letter:?}, and tables hold its name; rename the file or folder");
             }
             count += suite.len();

@@ -15,12 +15,9 @@ pyo3::create_exception!(
     "An environment was stepped after its episode had ended."
 );
 
-/// What an error may be long, characters: names and values in it are the user's.
-const ERROR_CHARS_MAX: usize = 3000;
-
 /// Bad input.
 pub(crate) fn input(error: impl Into<anyhow::Error>) -> PyErr {
-    PyValueError::new_err(storage::shortened(&format!("{:#}", error.into()), ERROR_CHARS_MAX))
+    PyValueError::new_err(storage::shortened(&format!("{:#}", error.into()), storage::ERROR_CHARS_MAX))
 }
 
 /// A whole number, as `check_whole` in Python takes it: pyo3 refuses those that do not fit their type with an `OverflowError`.

@@ -5,6 +5,14 @@ use comfy_table::Table;
 use evaluation::avoidable::Row;
 use experiment::lots::ALL;
 
+/// What stands below the table.
+pub const NOTES: &str = "\
+- Events: near-collisions. The other columns: how many of their places are passed, driven on from 6 s before with this one \
+thing replaced.
+- Nothing: by chance, or because driving on is not quite the same drive. No dead time: commands act at once. No smooth.: without \
+action smoothing.
+- Expert of the patch: an expert that sees the clean grid alone. Exp. 6 s: the expert drives from 6 s before.";
+
 /// A row for each driver and group of lots: how many near-collisions (events) there are, then how many of them are passed with each
 /// thing replaced.
 pub fn table(rows: &[Row]) -> Table {

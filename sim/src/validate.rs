@@ -103,7 +103,7 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
             format!("shorten it to at most {NAME_BYTES_MAX}; files are named after it"),
         );
     }
-    if let Some(bad) = name.chars().find(|&c| c.is_control() || matches!(c, '/' | '\\' | '|') || is_invisible(c)) {
+    if let Some(bad) = name.chars().find(|&c| matches!(c, '/' | '\\' | '|') || is_hidden(c)) {
         let problem = format!("the name {name:?} contains {bad:?}");
         return fault(
             Place::Name,
@@ -114,9 +114,10 @@ fn check_name(name: &str) -> Result<(), ScenarioError> {
     Ok(())
 }
 
-/// What shows nothing, or turns the direction of writing: two names that look the same must be the same.
-pub fn is_invisible(c: char) -> bool {
-    matches!(
+/// Whether a letter has no shape of its own: what a terminal obeys, what shows nothing, and what turns the direction of writing.
+/// Two names that look the same must be the same.
+pub fn is_hidden(c: char) -> bool {
+    let is_invisible = matches!(
         c,
         '\u{ad}'
             | '\u{61c}'
@@ -127,7 +128,8 @@ pub fn is_invisible(c: char) -> bool {
             | '\u{feff}'
             | '\u{fff9}'..='\u{fffb}'
             | '\u{e0000}'..='\u{e007f}'
-    )
+    );
+    c.is_control() || is_invisible
 }
 
 /// Before anything is compared with everything else.

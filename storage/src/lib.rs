@@ -12,4 +12,4 @@ pub mod whole;
 
 pub use error::{FileError, is_of_disk};
 pub use place::place_of;
-pub use quoted::shortened;
+pub use quoted::{ERROR_CHARS_MAX, shortened};

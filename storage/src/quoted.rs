@@ -2,6 +2,8 @@
 
 use std::fmt::Write as _;
 
+/// How long an error may be, characters: names and values in it are the user's.
+pub const ERROR_CHARS_MAX: usize = 3000;
 /// A number of more digits is quoted in part: the largest `f32` has 39.
 const DIGITS_MAX: usize = 40;
 /// The digits that are quoted of such a number.

@@ -3,7 +3,7 @@
 
 use clap::{ColorChoice, ValueEnum};
 use serde::Serialize;
-use sim::validate::is_invisible;
+use sim::validate::is_hidden;
 use std::fmt::Display;
 use std::io::{self, ErrorKind, IsTerminal as _, Write as _};
 use std::sync::Mutex;
@@ -160,18 +160,15 @@ pub(crate) fn line(text: impl Display) {
     let _ = writeln!(io::stderr().lock(), "{text}");
 }
 
-/// What an error may be long, characters: names and values in it are the user's.
-const ERROR_CHARS_MAX: usize = 3000;
-
 /// Text that may quote a file: without characters that a terminal obeys or that nobody sees, on as many lines as it has, and no
 /// longer than an error is read.
 pub(crate) fn printable(text: &str) -> String {
-    let text = storage::shortened(text, ERROR_CHARS_MAX);
+    let text = storage::shortened(text, storage::ERROR_CHARS_MAX);
     let mut printable = String::with_capacity(text.len());
     for character in text.chars() {
         match character {
             '\n' => printable.push('\n'),
-            _ if character.is_control() || is_invisible(character) => printable.extend(character.escape_default()),
+            _ if is_hidden(character) => printable.extend(character.escape_default()),
             _ => printable.push(character),
         }
     }
@@ -197,8 +194,8 @@ mod tests {
     fn an_error_quotes_no_character_that_a_terminal_obeys_and_has_an_end() {
         assert_eq!(printable("lot \u{1b}[2J\u{9b}\r:\nτ\t2"), "lot \\u{1b}[2J\\u{9b}\\r:\nτ\\t2");
         assert_eq!(printable("a\u{202e}b\u{200b}"), "a\\u{202e}b\\u{200b}", "it would be read backwards");
-        let long = printable(&"x".repeat(ERROR_CHARS_MAX + 1));
-        assert!(long.ends_with("x …") && long.chars().count() == ERROR_CHARS_MAX + 2, "{}", long.len());
+        let long = printable(&"x".repeat(storage::ERROR_CHARS_MAX + 1));
+        assert!(long.ends_with("x …") && long.chars().count() == storage::ERROR_CHARS_MAX + 2, "{}", long.len());
         assert_eq!(printable(&format!("scale: it is {}", 1e300)), "scale: it is 100000000000… (301 digits)");
     }
 }

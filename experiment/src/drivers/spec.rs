@@ -5,7 +5,7 @@ use super::shipped;
 use anyhow::{bail, ensure};
 use planners::PlannerSpec;
 use policy::checkpoint::Checkpoint;
-use sim::validate::is_invisible;
+use sim::validate::is_hidden;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -84,7 +84,7 @@ pub fn specs() -> Vec<(String, String)> {
 /// A letter that no driver, and no folder of a run, can have in its name: it would end a cell or a row of the tables, turn
 /// their direction of writing, or make two names look the same.
 pub fn never_in_a_name(name: &str) -> Option<char> {
-    name.chars().find(|&letter| letter == '|' || letter.is_control() || is_invisible(letter))
+    name.chars().find(|&letter| letter == '|' || is_hidden(letter))
 }
 
 impl FromStr for DriverSpec {

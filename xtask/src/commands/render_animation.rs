@@ -114,7 +114,7 @@ pub(super) fn run(args: &AnimationArgs, folder: &Folder<'_>) -> anyhow::Result<(
     let whole = ((to_s - from_s) / step_s(1.0, shown_cs) / FRAMES_WANTED).ceil().max(1.0);
     let speed = args.speed.unwrap_or(if moments.is_empty() { whole } else { 1.0 });
     let step_s = step_s(speed, shown_cs);
-    let count = ((to_s - from_s) / step_s) as u32;
+    let count = steps(from_s, to_s, step_s);
     ensure!(
         count < PICTURES_MAX,
         "this comes to {count} pictures, and at most {PICTURES_MAX} are drawn; show less with --from and --to, fewer with \
@@ -149,9 +149,14 @@ fn step_s(speed: f32, shown_cs: u16) -> f32 {
     speed * f32::from(shown_cs) / 100.0
 }
 
+/// Whole steps from one time to another.
+fn steps(from_s: f32, to_s: f32, step_s: f32) -> u32 {
+    ((to_s - from_s) / step_s) as u32
+}
+
 /// From one time to another, the last one included: whoever drives longest arrives there.
 fn times_s(from_s: f32, to_s: f32, step_s: f32) -> Vec<f32> {
-    let count = ((to_s - from_s) / step_s) as u32;
+    let count = steps(from_s, to_s, step_s);
     let mut times_s: Vec<f32> = (0..=count).map(|i| from_s + i as f32 * step_s).collect();
     times_s.extend((times_s[count as usize] < to_s).then_some(to_s));
     times_s

@@ -19,14 +19,6 @@ From 6 s before each near-collision the car is driven on: with nothing changed, 
 action smoothing, by an expert that sees the clean patch alone; and by the expert, from 24 s to 0.5 s before. The table counts the
 places that are passed.";
 
-/// Below the table.
-const NOTES: &str = "\
-- Events: near-collisions. The other columns: how many of their places are passed, driven on from 6 s before with this one \
-thing replaced.
-- Nothing: by chance, or because driving on is not quite the same drive. No dead time: commands act at once. No smooth.: without \
-action smoothing.
-- Expert of the patch: an expert that sees the clean grid alone. Exp. 6 s: the expert drives from 6 s before.";
-
 #[derive(Debug, Clone, Args)]
 pub(crate) struct WhatIfArgs {
     /// Folder of an evaluation, or of a training that ended with one; its settings are used.
@@ -46,7 +38,11 @@ pub(crate) fn run(args: &WhatIfArgs, output: &Output) -> anyhow::Result<()> {
         return Err(Interrupted { kept: "nothing is written".to_owned() }.into());
     };
     let text = || {
-        if rows.is_empty() { "no near-collisions".to_owned() } else { format!("{}\n\n{NOTES}", what_if::table(&rows)) }
+        if rows.is_empty() {
+            "no near-collisions".to_owned()
+        } else {
+            format!("{}\n\n{}", what_if::table(&rows), what_if::NOTES)
+        }
     };
     output.table(text, &rows)
 }
