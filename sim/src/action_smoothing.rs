@@ -149,4 +149,10 @@ mod tests {
         let again = smoothing.smoothed(at(6.0, -2.0));
         assert!((again.ahead_m - 6.0).abs() < 1e-4 && (again.left_m + 2.0).abs() < 1e-4, "{again:?}");
     }
+
+    #[test]
+    fn a_point_behind_the_axle_becomes_the_one_ahead_on_the_same_circle() {
+        let ahead = ActionSmoothing::new(8.0).smoothed(at(-1.3, 7.1));
+        assert!((ahead.ahead_m - 1.3).abs() < 1e-4 && (ahead.left_m - 7.1).abs() < 1e-4, "{ahead:?}");
+    }
 }

@@ -171,8 +171,9 @@ impl BodyBox {
         let curvature_max_per_m = on_per_m.max(-back_per_m);
         // Driving on before the sweep changes heading and position of its poses, and so does another curvature.
         let bent_per_m = (on_per_m - curvature_per_m.abs()).max(curvature_per_m.abs() - back_per_m);
-        let turned_rad = curvature_max_per_m * driven_m + bent_per_m * (driven_m + travel_m);
-        let moved_m = driven_m + 0.5 * bent_per_m * travel_m * travel_m + self.disc_reach_m * turned_rad;
+        let bent_over_m = driven_m + travel_m;
+        let turned_rad = curvature_max_per_m * driven_m + bent_per_m * bent_over_m;
+        let moved_m = driven_m + 0.5 * bent_per_m * bent_over_m * bent_over_m + self.disc_reach_m * turned_rad;
         let steps = sweep_steps(travel_m);
         (0..=steps).all(|i| {
             let pose = state.pose.advanced_along_arc(curvature_per_m, travel_m * i as f32 / steps as f32);

@@ -186,3 +186,46 @@ impl<D: Driver> Fleet for OneDriverEach<D> {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Vec2;
+    use crate::sensing::{BEV_PIXELS, GRID_CELLS};
+
+    /// Everything else is measured in this frame, so a sign or an axis swapped here would agree with itself everywhere.
+    #[test]
+    fn image_fractions_run_from_the_far_left_corner_to_the_near_right_one() {
+        let geometry = GridGeometry::paper();
+        let places = [
+            ([0.0, 0.0], 16.3, 6.0),
+            ([1.0, 0.0], 16.3, -6.0),
+            ([0.0, 1.0], 4.3, 6.0),
+            ([0.5, 0.5], 10.3, 0.0),
+            ([0.25, 1.25], 1.3, 3.0),
+        ];
+        for ([u, w], ahead_m, left_m) in places {
+            let point = LookAheadPoint::from_image_fraction([u, w], &geometry);
+            let error_m = (point.ahead_m - ahead_m).abs().max((point.left_m - left_m).abs());
+            assert!(error_m < 1e-5, "({u}, {w}) is {point:?}");
+            let back = LookAheadPoint { ahead_m, left_m }.to_image_fraction(&geometry);
+            assert!((back[0] - u).abs().max((back[1] - w).abs()) < 1e-6, "({ahead_m}, {left_m}) is {back:?}");
+        }
+    }
+
+    #[test]
+    fn pixels_and_cells_lie_where_their_image_fractions_say() {
+        let geometry = GridGeometry { side_m: 9.0, near_edge_ahead_m: 3.7 };
+        let error = |centre: Vec2, row: usize, col: usize, count: usize| {
+            let [u, w] = LookAheadPoint { ahead_m: centre.x, left_m: centre.y }.to_image_fraction(&geometry);
+            let share = |index: usize| (index as f32 + 0.5) / count as f32;
+            (u - share(col)).abs().max((w - share(row)).abs())
+        };
+        for (row, col) in (0..BEV_PIXELS).flat_map(|row| (0..BEV_PIXELS).map(move |col| (row, col))) {
+            assert!(error(geometry.pixel_in_ego(row, col), row, col, BEV_PIXELS) < 1e-6, "pixel {row}, {col}");
+        }
+        for (row, col) in (0..GRID_CELLS).flat_map(|row| (0..GRID_CELLS).map(move |col| (row, col))) {
+            assert!(error(geometry.cell_in_ego(row, col), row, col, GRID_CELLS) < 1e-6, "cell {row}, {col}");
+        }
+    }
+}

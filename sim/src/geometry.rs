@@ -325,6 +325,15 @@ pub fn rectangle(centre: Pose, length_m: f32, width_m: f32) -> [Vec2; 4] {
 mod tests {
     use super::*;
 
+    #[test]
+    fn angles_wrap_to_less_than_half_a_turn_and_half_a_turn_is_positive() {
+        use std::f32::consts::PI;
+        for (half_turns, expected) in [(0.3, 0.3), (1.0, 1.0), (-1.0, 1.0), (1.5, -0.5), (-1.5, 0.5), (-7.25, 0.75)] {
+            let wrapped_rad = wrap_angle(half_turns * PI);
+            assert!((wrapped_rad - expected * PI).abs() < 1e-5, "{half_turns} half turns: {wrapped_rad}");
+        }
+    }
+
     /// The sensor and its brute-force check share this culling, so only this test would see it go wrong.
     #[test]
     fn circles_that_overlap_are_all_found_and_no_others() {

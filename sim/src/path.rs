@@ -156,4 +156,16 @@ mod tests {
             assert!((path.project_near_m(offset, s_m + 1.0, 5.0, 5.0) - s_m).abs() < 0.02);
         }
     }
+
+    #[test]
+    fn corners_tighten_on_short_segments_and_the_way_back_is_not_taken_for_the_way_there() {
+        let points = vec![Vec2::ZERO, Vec2::new(20.0, 0.0), Vec2::new(20.0, 6.0), Vec2::new(0.0, 6.0)];
+        let path = Path::new(&ReferencePath { points, corner_radius_m: 5.0 });
+        // Two quarter turns of 3 m, half of the short segment.
+        let length_m = 17.0 + 3.0 * std::f32::consts::PI + 17.0;
+        assert!((path.length_m() - length_m).abs() < 1e-3, "{} m, expected {length_m} m", path.length_m());
+        let nearer_the_way_back = Vec2::new(5.0, 3.5);
+        assert!((path.project_m(nearer_the_way_back) - (length_m - 5.0)).abs() < 0.02);
+        assert!((path.project_near_m(nearer_the_way_back, 5.0, 5.0, 5.0) - 5.0).abs() < 0.02);
+    }
 }

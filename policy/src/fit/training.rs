@@ -1,6 +1,6 @@
 //! One training: steps, validation, and which weights are kept.
 
-use crate::dataset::{Dataset, Sample, Split};
+use crate::dataset::{Dataset, Sample, Split, kept_places};
 use crate::files::FileError;
 use crate::fit::batch_sampler::BatchSampler;
 use crate::fit::device::DeviceChoice;
@@ -289,7 +289,7 @@ fn thinned(samples: &[Sample], at_most: usize) -> Cow<'_, [Sample]> {
     if at_most == 0 || at_most >= samples.len() {
         return Cow::Borrowed(samples);
     }
-    Cow::Owned((0..at_most).map(|i| samples[i * samples.len() / at_most]).collect())
+    Cow::Owned(kept_places(samples.len(), at_most).map(|place| samples[place]).collect())
 }
 
 fn occupied(samples: &[Sample], device: &Device) -> Tensor<3, burn::tensor::Bool> {
