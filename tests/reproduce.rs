@@ -385,7 +385,8 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     let table = std::fs::read_to_string(out.join("scaling.md")).unwrap();
     let rows: Vec<&str> = table.lines().filter(|line| line.contains("| BC ") || line.contains("| DAgger ")).collect();
     assert_eq!(rows.len(), 4, "two trainings, two policies of each:\n{table}");
-    assert!(rows[0].starts_with("| 2 ") && rows[3].starts_with("| 1 "), "{table}");
+    // Each is compared with that of the next more lots, however they are named.
+    assert!(rows[0].starts_with("| 1 ") && rows[3].starts_with("| 2 "), "{table}");
     assert!(std::fs::read_to_string(out.join("scaling.svg")).unwrap().contains("different lots"));
     assert!(std::fs::read_to_string(out.join("scaling.csv")).unwrap().contains("validation-lane"));
 

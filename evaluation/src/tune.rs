@@ -323,8 +323,9 @@ fn search(
         // What is read back took none of the time.
         if log.is_read() {
             let share = (tried.len() * course.search.trials.len()) as f64 / runs_all as f64;
-            let status = || best.map_or_else(String::new, |(_, _, totals)| format!("{} failures", rank(totals).1));
-            progress.at(share, &mut |_| status());
+            let events = best.map(|(_, _, totals)| rank(totals).1);
+            let said = |events: u32| format!("best so far: {events} near-collisions and times stuck");
+            progress.at(share, &mut |_| events.map_or_else(String::new, said));
         }
         let generation = search.ask(best.map(|(point, ..)| point.as_slice()));
         if generation.is_empty() {

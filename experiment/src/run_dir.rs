@@ -6,8 +6,9 @@
 //!   settings.toml      every setting
 //!   round-00/ …        data, network and loss curve of each round (policy::dataset::store)
 //!   table1.md .json    the paper's table from this run
-//!   summary.md .json .csv, comparisons.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
-//!   wall_time.jsonl    the only file that differs from one repetition to the next, except for the manifest
+//!   summary.md .json .csv, comparisons.csv, trainings.csv, noise_sweep.csv, runs.jsonl, failures.md .jsonl     (evaluate)
+//!   report.html .md    what people read first; it quotes the command line
+//!   wall_time.jsonl    differs from one repetition to the next, as manifest, report and lists of digests do, and nothing else
 //!   finished.toml      written last
 //!   sha256sums         the digest of every finished file; it appears with the claim
 //!   .lock              who writes here

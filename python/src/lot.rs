@@ -198,8 +198,8 @@ pub(crate) fn check_generate(py: Python<'_>, names: Vec<String>, seed: u64, coun
     })
 }
 
-/// Draws lots: name, TOML and PNG of each, route in metres and number of obstacles. With `out`, TOML and PNG are files
-/// there, and what is returned instead of their content are their paths.
+/// Draws lots: of each its name, TOML, the path of its TOML file, route in metres and number of obstacles. With `out`,
+/// TOML and PNG are files there; without, nothing is written and paths are empty.
 #[pyfunction]
 #[expect(clippy::type_complexity, reason = "columns of a table in Python")]
 pub(crate) fn generate(

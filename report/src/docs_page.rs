@@ -51,9 +51,14 @@ pub(crate) fn head(
     ];
     let mut head = format!("{WRITTEN}\n\n| | |\n|---|---|\n");
     for (name, value) in rows.iter().chain(more) {
-        let _ = writeln!(head, "| {name} | {value} |");
+        let _ = writeln!(head, "{}", row(name, value));
     }
     head
+}
+
+/// A row of the table: a `|` in a value, such as the name of a file, would end its column, in code as well.
+fn row(name: &str, value: &str) -> String {
+    format!("| {name} | {} |", value.replace('|', "\\|"))
 }
 
 fn written_by(run: &str, others: &[String], to: Option<&Path>) -> String {
@@ -66,4 +71,16 @@ fn written_by(run: &str, others: &[String], to: Option<&Path>) -> String {
         words.extend(["--to".to_owned(), quoted_path(to)]);
     }
     words.join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The rest of the command line was lost behind it.
+    #[test]
+    fn a_command_line_stays_in_its_column() {
+        let command = "`cargo xtask evaluate --lots 'a|b.toml'`";
+        assert_eq!(row("command", command), "| command | `cargo xtask evaluate --lots 'a\\|b.toml'` |");
+    }
 }

@@ -229,10 +229,11 @@ fn headline(page: &mut Page, reference: &DrivenPlan<'_>, unseen: &DrivenPlan<'_>
             table.add_row(trainings::headline_row(&place, driver));
         }
     }
+    let near_m = reference.plan.settings.episode.metrics.near_collision_m;
     page.section(
         "In short",
         format!(
-            "{table}\n\nA *near-collision*: something lies within 0.5 m in the direction of travel; the car is stopped, put \
+            "{table}\n\nA *near-collision*: something lies within {near_m} m in the direction of travel; the car is stopped, put \
              back on the route, and drives on. A *contact*: the body touches something. *Least clearance*: the smallest \
              distance of the body to anything in any run. Where there are several trainings, the route is that of each, \
              the rate is their mean, with an interval for other trials or lots and other seeds, and the clearance is the least \

@@ -116,7 +116,7 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> 
     let listed = Lot::parse_all(&settings.training.lots, &settings.episode.vehicle)?;
     let of_a_kind = lots::generated_by_kind(&listed);
     let mut learned: Vec<Learned> = Vec::new();
-    for (at, &different) in extent.different_lots.iter().enumerate() {
+    for (at, different) in ascending(&extent.different_lots) {
         let folder = root.join(scaling::folder(different));
         let table1 = Table1::read(&folder)?.with_context(|| format!("{}: no table1.json", folder.display()))?;
         let samples = [table1.rows.first(), table1.rows.last()].map(|row| row.map_or(0, |row| row.dataset));
@@ -168,6 +168,13 @@ fn rows(settings: &Settings, extent: &Extent, stages: &[Stage], root: &Path) -> 
     Ok(rows)
 }
 
+/// The numbers of lots from the smallest on, each with its place among those asked for.
+fn ascending(different_lots: &[u32]) -> Vec<(usize, u32)> {
+    let mut numbers: Vec<(usize, u32)> = different_lots.iter().copied().enumerate().collect();
+    numbers.sort_by_key(|&(_, lots)| lots);
+    numbers
+}
+
 fn plot(rows: &[&Row]) -> String {
     let of = |method: &'static str| rows.iter().filter(move |row| row.method == method);
     let counts: BTreeSet<usize> = rows.iter().map(|row| row.different_lots).collect();
@@ -180,4 +187,16 @@ fn plot(rows: &[&Row]) -> String {
         .map(|method| RateSeries { name: method.to_owned(), points: of(method).map(|row| point(row)).collect() });
     let counts: Vec<String> = counts.iter().map(ToString::to_string).collect();
     plots::rates_against_lots("Near-collisions on unseen lots", &counts, &series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of `--different 16,1,4` the rate of one lot was subtracted from that of sixteen, as that of more lots.
+    #[test]
+    fn each_number_of_lots_is_compared_with_the_next_larger_one_however_they_are_named() {
+        assert_eq!(ascending(&[16, 1, 4]), [(1, 1), (2, 4), (0, 16)]);
+        assert_eq!(ascending(&[1, 4]), [(0, 1), (1, 4)]);
+    }
 }

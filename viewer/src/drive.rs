@@ -17,7 +17,7 @@ use policy::decision_rule::{DecisionRule, Evidence};
 use policy::drivers::NetPolicy;
 use policy::network::Prediction;
 use rerun::{AsComponents, SeriesLines, StateChange, StateConfiguration, TextLog, TextLogLevel};
-use sim::driver::{Driver as _, GroundTruth, LookAheadPoint, Policy as _, Situation, Source, Spread};
+use sim::driver::{Decision, Driver as _, GroundTruth, LookAheadPoint, Policy as _, Situation, Source, Spread};
 use sim::episode::{Episode, EpisodeSettings};
 use sim::frame::{Event, Frame};
 use sim::geometry::Vec2;
@@ -113,9 +113,13 @@ impl<'a> Drive<'a> {
         Self { colour: Some(colour), ..self }
     }
 
-    /// Lets a frame pass that is not shown.
+    /// Lets a frame pass that is not shown. Those who remember are asked all the same: what they say later follows from
+    /// it.
     pub(crate) fn skip(&mut self, frame: &Frame) {
-        self.time_s = f64::from(frame.time_s);
+        self.ask_expert(frame, false);
+        self.ask_novice(frame);
+        self.ask_planner(frame, false);
+        self.pass(frame);
     }
 
     /// Shows what does not change: the car, its ring, names and colours.
@@ -170,6 +174,11 @@ impl<'a> Drive<'a> {
             self.sensors.show(&self.map, frame, self.recording);
         }
         self.happened(frame);
+        self.pass(frame);
+    }
+
+    /// What the next frame has to know of this one.
+    fn pass(&mut self, frame: &Frame) {
         self.was_reset = matches!(frame.event, Event::NearCollision { .. } | Event::Stuck { .. });
         self.time_s = f64::from(frame.time_s);
     }
@@ -201,7 +210,7 @@ impl<'a> Drive<'a> {
     /// The way behind the car, piece by piece: the viewer shows all pieces up to the cursor.
     fn trace(&mut self, frame: &Frame) {
         let position = frame.vehicle.pose.position();
-        if self.was_reset {
+        if self.was_reset || self.swept.is_none() {
             (self.swept, self.driven) = (None, vec![position]);
         }
         if self.swept.is_some_and(|last| last.distance(position) < SWEPT_EVERY_M) {
@@ -258,6 +267,16 @@ impl<'a> Drive<'a> {
         }
     }
 
+    /// What the network would have said while the expert drove. It is asked at every tick, also when it drove itself,
+    /// because it smooths its answers.
+    fn ask_novice(&mut self, frame: &Frame) -> Option<Decision> {
+        let novice = self.novice.as_mut()?;
+        if self.was_reset {
+            novice.reset();
+        }
+        Some(novice.act(&frame.observation))
+    }
+
     /// What the planner weighed. It is asked at every tick, because it estimates its wheel angle.
     fn ask_planner(&mut self, frame: &Frame, explain: bool) -> Option<Explanation> {
         let planner = self.planner.as_mut()?;
@@ -308,13 +327,7 @@ impl<'a> Drive<'a> {
     /// The answers of learner and expert side by side, how far they are apart (τ̂) and how sure the learner is (χ̂).
     fn compare(&mut self, frame: &Frame, expert: LookAheadPoint) {
         let driven = frame.decision;
-        // It is asked at every tick, also when it drove itself, because it smooths its answers.
-        let said = self.novice.as_mut().map(|novice| {
-            if self.was_reset {
-                novice.reset();
-            }
-            novice.act(&frame.observation)
-        });
+        let said = self.ask_novice(frame);
         let (learner, expert) = if driven.source == Source::Expert {
             if let Some(said) = said {
                 self.log("car/network_point", &shapes::dots(&[dot(said.look_ahead, 5.0, colours::NOVICE)]));

@@ -386,6 +386,25 @@ fn a_moment_begins_a_second_before_it_on_a_time_line_of_its_own() {
     assert!(before > 10, "the way up to there is shown from the start: {swept:?}");
 }
 
+/// The expert beside the driver began to think where the recording does: it had forgotten what it saw before.
+#[test]
+fn what_is_said_around_a_moment_is_what_is_said_in_the_whole_drive() {
+    let folder = scratch("memory");
+    let points = |tick: u32| {
+        let mut request = request(&format!("vvf@lot-b@forward@0@paper@1@{tick}"), &folder);
+        let Show::Drives { settings, .. } = &mut request.show[0] else { unreachable!("a drive was asked for") };
+        (settings.expert.label_jitter, settings.episode.metrics.timeout_s) = (0.01, 60.0);
+        crate::show(&request, &Silent, &mut Vec::new()).unwrap();
+        Shown::of_file(&folder.join("a.rrd")).points("vvf/car/expert_point", &Points3D::descriptor_positions())
+    };
+    let (whole, around) = (points(0), points(300));
+    std::fs::remove_dir_all(&folder).unwrap();
+    assert!(around.len() > 200 && around.keys().all(|tick| *tick > 90), "ten seconds before and five after");
+    for (tick, point) in around {
+        assert_eq!(point, whole[&tick], "tick {tick}");
+    }
+}
+
 /// Asks to stop after so many reports.
 struct StopAfter(Cell<u32>);
 

@@ -59,8 +59,8 @@ pub(crate) fn run(args: &VerifyArgs, output: &Output) -> anyhow::Result<()> {
 /// A fault with what helps: nothing that a run goes on with may be deleted, and a report can be written again.
 fn advised(fault: &FileError, is_unfinished: bool) -> String {
     if is_unfinished && sums::is_unfinished(fault) {
-        let (path, problem) = (fault.path.display(), &fault.problem);
-        return format!("{path}: {problem}; the run is not finished, and continues with --resume");
+        // How it is continued is said once, below all of them.
+        return format!("{}: {}; the run is not finished", fault.path.display(), fault.problem);
     }
     match run_dir::way_to_report(&fault.path).filter(|_| !is_unfinished) {
         Some(way) => format!("{}: {}; write it again with: {way}", fault.path.display(), fault.problem),
