@@ -203,7 +203,7 @@ fn lots_that_are_refused() {
         ("x_m = 15", "x_m = -99", "speed_bump 1: it stands at"),
         ("x_m = 15", "x_m = nan", "speed_bump 1: x_m is NaN"),
         ("[[island]]", &format!("{islands}[[island]]"), "there are 5001 islands; leave some out: at most 5000 fit"),
-        ("[[speed_bump]]", "[speed_bump]", "invalid type: map, expected a sequence"),
+        ("[[speed_bump]]", "[speed_bump]", "has double brackets, as in [[obstacle]]"),
         ("[[speed_bump]]", &format!("{bumps}[[speed_bump]]"), "there are 1002 speed bumps"),
         ("[[obstacle]]", &format!("{many}[[obstacle]]"), "there are 10002 obstacles"),
         ("[[obstacle]]", "[[obstacles]]", "unknown field `obstacles`"),

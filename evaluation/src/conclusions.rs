@@ -419,7 +419,8 @@ fn metres_needed(per_100m: [f64; 2], dispersion: f64) -> String {
         return String::new();
     }
     let question = Question { per_100m, power: 0.8, alpha: 1.0 - CONFIDENCE, dispersion };
-    format!("; if these are the rates, about {:.0} km each would tell", (question.metres_each() / 1000.0).ceil())
+    let km = (question.metres_each() / 1000.0).ceil();
+    format!("; if these are the rates, about {km:.0} km each would tell in four of five evaluations")
 }
 
 /// The network's share rises from iteration to iteration until it passes η. One training decides; there is no interval.

@@ -96,8 +96,8 @@ pub struct Row {
     pub safe_ratio_unweighted: Option<f64>,
     /// Times the body touched something.
     pub contacts: u32,
-    /// Interval of contacts per 100 m of route: the wider of the exact one and the bootstrap's. `None` in files of earlier
-    /// versions.
+    /// Interval of contacts per 100 m of route: the farther ends of the exact one and the bootstrap's. `None` in files of
+    /// earlier versions.
     #[serde(default)]
     pub contacts_per_100m_lower: Option<f64>,
     /// See `contacts_per_100m_lower`.
@@ -107,7 +107,7 @@ pub struct Row {
     pub stuck: u32,
     /// Runs ended by the time limit.
     pub timed_out: u32,
-    /// Runs given up after too many events.
+    /// Runs given up: after too many events, or where nothing ahead on the route is free.
     pub given_up: u32,
     /// Driven way per simulated time, m/s.
     pub mean_speed_mps: f64,
@@ -142,11 +142,11 @@ pub struct ComparisonRow {
     pub excludes_zero: Option<bool>,
     /// Rate ratio, driver / other.
     pub ratio: Option<f64>,
-    /// Exact interval.
+    /// Exact interval, if each event came by itself: not to be quoted where those of either driver cluster.
     pub ratio_lower: f64,
     /// See `ratio_lower`; `None` if unbounded.
     pub ratio_upper: Option<f64>,
-    /// Exact test of equal rates.
+    /// Exact test of equal rates, if each event came by itself.
     pub p_value: f64,
     /// The same, adjusted for the number of comparisons.
     pub p_holm: f64,
@@ -360,7 +360,8 @@ impl<'a> Summary<'a> {
 
     /// What was judged at a noise level, slice by slice.
     pub fn at_level(&self, level: usize) -> impl Iterator<Item = &Judged> {
-        self.judged.iter().filter(move |judged| judged.level == level)
+        let slices = self.judged.len() / self.levels().len();
+        self.judged[level * slices..][..slices].iter()
     }
 
     /// Driver by driver, slice by slice, where anything was driven.

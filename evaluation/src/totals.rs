@@ -24,7 +24,7 @@ pub struct Totals {
     pub stuck: u32,
     /// Runs ended by the time limit.
     pub timed_out: u32,
-    /// Runs given up after too many events.
+    /// Runs given up: after too many events, or where nothing ahead on the route is free.
     pub given_up: u32,
     /// Safe ratios of the runs, added up.
     pub safe_ratio_sum: f64,

@@ -55,8 +55,8 @@ impl FromStr for ReplayKey {
         let parts: Vec<&str> = text.split('@').collect();
         let [driver, lot, direction, trial, noise, seed, tick] = parts[..] else {
             bail!(
-                "replay key {text:?} has {} parts, not the 7 of DRIVER@LOT@WAY@TRIAL@NOISE@SEED@TICK; copy a whole one, as in \
-                 expert@lot-b@reverse@3@paper@1@842",
+                "replay key {text:?} has {} parts, not the 7 of DRIVER@LOT@WAY@TRIAL@NOISE@SEED@TICK; copy a whole one from the \
+                 failures.md or runs.jsonl of a run, as in expert@lot-b@reverse@3@paper@1@842",
                 parts.len()
             );
         };

@@ -512,8 +512,8 @@ fn add_moments(
         "Near-collisions",
         format!(
             "{listed}{shown} The dot is the {}, in the grid with the ellipses of 1σ and 2σ that a network predicts; \
-             coloured cells are wrong, and the colour says why. The commands replay the drive; run them in the folder in \
-             which this report was made.",
+             coloured cells are wrong, and the colour says why. The commands record the drive for Rerun (docs/recordings.md: \
+             the first call builds the viewer); run them in the folder in which this report was made.",
             glossary::LOOK_AHEAD_POINT.link("look-ahead point")
         ),
     );

@@ -111,11 +111,11 @@ fn to_markdown(summary: &Summary<'_>, rows: Rows) -> String {
          lots where these are a sample: generated, or six or more from files) where the dispersion exceeds {DISPERSION_MAX} and \
          events cannot be taken for independent; (b) is no narrower than the exact one. \"< one-sided\": the bound of 95 % where there was none.\n\
          - Dispersion: variance of the rate over what it would be if each near-collision came by itself.\n\
-         - Contacts: times the body touched something, with the wider of both intervals, since one drive may have many.\n\
+         - Contacts: times the body touched something, with the farther ends of both intervals, since one drive may have many.\n\
          - Unweighted: every lot, or all generated ones of a kind, and direction counts the same, however long its route.\n\
-         - Stuck: no headway for a while. Given up: too many near-collisions in one run. Timed out: the time limit. Least clearance: \
-         negative is how deep the body was in something. Reversals: changes of the steering's direction. Steering: how far the \
-         wheels were turned in all.\n\
+         - Stuck: no headway for a while. Given up: too many near-collisions in one run, or nothing free ahead on the route. \
+         Timed out: the time limit. Least clearance: negative is how deep the body was in something. Reversals: changes of the \
+         steering's direction. Steering: how far the wheels were turned in all.\n\
          {causes}\
          - Safe ratio: free share of the metre around the body; its intervals, and those of differences (Δ), are bootstrap.\n\
          - *: excludes zero, by six trials or lots that differ, or more. Rate ratio and p: exact test of equal rates; – where events of \
@@ -314,11 +314,12 @@ fn sweep_table(summary: &Summary<'_>, rows: Rows) -> Table {
     let mut header = vec!["driver".to_owned(), "lots".to_owned()];
     header.extend(summary.levels().iter().map(|noise| format!("noise {noise}")));
     let mut table = with_header(header);
+    let slices = summary.results.slices();
     for driver in 0..summary.plan.drivers.len() {
-        for slice in summary.results.slices().into_iter().filter(|slice| rows.has(slice)) {
+        for (place, slice) in slices.iter().enumerate().filter(|(_, slice)| rows.has(slice)) {
             let rate = |level| {
-                let totals = summary.results.totals(level, driver, &slice, None);
-                let judged = summary.at_level(level).find(|judged| judged.slice == slice);
+                let totals = summary.results.totals(level, driver, slice, None);
+                let judged = summary.at_level(level).nth(place);
                 let of_driven = judged.filter(|_| totals.runs > 0);
                 of_driven.map_or_else(
                     || "–".to_owned(),

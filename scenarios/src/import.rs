@@ -176,7 +176,7 @@ impl MapLot {
         let mut lot: Self = toml_edit::de::from_str(text).map_err(|error| {
             let offset = error.span().map_or(0, |span| span.start);
             let problem = error.message().trim().to_owned();
-            let remedy = "scenarios/examples/car-park.lot.toml shows every key".to_owned();
+            let remedy = "docs/maps.md explains every key".to_owned();
             LoadError::faulty(&path.display().to_string(), text, offset, &problem, remedy)
         })?;
         let folder = path.parent().unwrap_or(Path::new(""));
@@ -576,6 +576,9 @@ impl MapLot {
 
     fn no_route(&self, reason: NoRoute, frame: Frame, start: Pose, finish: Finish, car: &VehicleSettings) -> LoadError {
         let clearance_m = self.clearance_m();
+        // Of what a lidar saw a few stray pixels may be all that is in the way.
+        let or_specks =
+            if is_case(&self.map) { "" } else { "leave specks out with drop_specks_m2 (--drop-specks of generate), " };
         let blocked = |place: &str, pose: Pose| {
             let problem = format!(
                 "the car ({:.2} m × {:.2} m, and {clearance_m} m around it) does not stand free at {}",
@@ -583,7 +586,9 @@ impl MapLot {
                 car.width_m,
                 frame.said(pose.position())
             );
-            self.fault(place, problem, "move or turn it away from what is not drivable, or enlarge the lot with scale")
+            let remedy =
+                format!("move or turn it away from what is not drivable, {or_specks}or enlarge the lot with scale");
+            self.fault(place, problem, &remedy)
         };
         // Where the route ends, by which key, and what can be moved.
         let (end, given, movable) = match finish {
@@ -614,7 +619,8 @@ impl MapLot {
                     "the passage near {} is too narrow: about {width_m:.1} m in the lot, and the car needs {need_m:.2} m",
                     frame.said(at)
                 );
-                self.fault("route", problem, "widen it, enlarge the lot with scale, or lower clearance_m")
+                let remedy = format!("widen it, {or_specks}enlarge the lot with scale, or lower clearance_m");
+                self.fault("route", problem, &remedy)
             }
             (NoRoute::Askew { at, off_deg }, _) => {
                 let problem = format!(
@@ -635,7 +641,8 @@ impl MapLot {
                     route::radius_min_m(car)
                 );
                 let remedy = format!(
-                    "widen the map there, turn or move {movable}, enlarge the lot with scale, or lower clearance_m"
+                    "widen the map there, {or_specks}turn or move {movable}, enlarge the lot with scale, or lower \
+                     clearance_m"
                 );
                 self.fault("route", problem, &remedy)
             }

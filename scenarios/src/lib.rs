@@ -178,6 +178,9 @@ fn lots_of(name: &str) -> Result<Vec<LotSpec>, SpecError> {
     if path.extension().is_some_and(|extension| extension == "toml") || import::is_map(path) {
         return Ok(vec![LotSpec::File(name.into())]);
     }
+    if path.extension().is_some_and(|extension| ["pgm", "png"].iter().any(|image| extension == *image)) {
+        return Err(SpecError::new(name, "is an image, not a lot; name the .yaml or .toml file beside it"));
+    }
     if let Some(lot) = generated_lot(name) {
         return Ok(vec![lot]);
     }
@@ -296,6 +299,7 @@ mod tests {
     fn other_names_are_refused_with_what_there_is() {
         let table = [
             ("lot-d", "\"lot-d\" is not a lot; there are lot-a, lot-b"),
+            ("office.pgm", "\"office.pgm\" is an image, not a lot; name the .yaml or .toml file beside it; there are"),
             ("", "\"\" is not a lot; there are"),
             ("lot-a,", "\"\" is not a lot; there are"),
             ("train", "\"train\" does not say how many lots; there are"),

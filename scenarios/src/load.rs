@@ -172,6 +172,8 @@ fn remedy_for(problem: &str) -> &'static str {
         "use one of these"
     } else if problem.starts_with("invalid length") {
         "write points as [x, y]"
+    } else if problem.starts_with("invalid type: map, expected a sequence") {
+        "a section of which there may be several has double brackets, as in [[obstacle]]"
     } else if problem.starts_with("invalid type") {
         "write a value of the expected type"
     } else {

@@ -116,8 +116,8 @@ impl std::fmt::Display for Note {
             }
             Self::Padded { specks } => write!(
                 f,
-                "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 in NAME.lot.toml \
-                 leaves out such specks",
+                "{} of occupied pixels, too small for an island, made 10 cm large; drop_specks_m2 (--drop-specks of cargo \
+                 xtask generate) leaves out such specks",
                 are(*specks, "speck", "specks")
             ),
             Self::Thickened { pixels } => write!(

@@ -129,6 +129,8 @@ impl FromStr for DriverSpec {
                     specs().into_iter().map(|(spec, _)| spec).collect()
                 };
                 ensure!(!text.contains(','), "no driver {text:?}; name several with spaces between them");
+                let is_file = !text.contains(':') && path.extension().is_some_and(|extension| extension == "onnx");
+                ensure!(!is_file, "no driver {text:?}; did you mean onnx:{text}?");
                 let lower = text.to_lowercase();
                 let nearest = known
                     .iter()
@@ -292,6 +294,7 @@ mod tests {
             ("ensemble:run:runs/a,run:./runs/a", "named twice"),
             ("ensemble:", "there are expert, grid-expert, trained:default, run:DIR"),
             ("python:mine", "lotpilot.evaluate"),
+            ("mine.onnx", "did you mean onnx:mine.onnx?"),
             ("run:runs/a|b", "contains '|', and tables hold its name; rename the file or folder"),
             ("ensemble:run:runs/a,net:b|c", "contains '|'"),
             ("dwa:my\ndwa.toml", "contains '\\n'"),

@@ -153,8 +153,10 @@ fn explain(key: &str, message: &str) -> String {
     let message = message.lines().next().unwrap_or(message);
     let Some((_, expected)) = message.split_once("unknown field ").or_else(|| message.split_once("unknown variant "))
     else {
+        let list = if message.ends_with("expected a sequence") { "; write a list, as in '[\"lot-a\"]'" } else { "" };
         let domain = reference::entry(key).map(reference::Entry::domain).filter(|domain| !domain.is_empty());
-        return domain.map_or_else(|| message.to_owned(), |domain| format!("{message}; it may be {domain}"));
+        let domain = domain.map_or_else(String::new, |domain| format!("; it may be {domain}"));
+        return format!("{message}{list}{domain}");
     };
     if let Some(hint) = renamed::hint(key) {
         return hint;

@@ -133,6 +133,8 @@ fn errors_name_the_key_and_what_there_is() {
         (&["episode.vehicle.steering_ratio=15"], &["steering_ratio is gone"]),
         (&["dagger.eta"], &["--set dagger.eta", "as in --set dagger.eta=0.8"]),
         (&["training.lots=[lot-a]"], &["quotes"]),
+        (&["training.lots=lot-a"], &["training.lots", "expected a sequence; write a list, as in '[\"lot-a\"]'"]),
+        (&["training.directions=forward"], &["write a list, as in '[\"lot-a\"]'; it may be forward | reverse"]),
         (&["seed.of=1"], &["seed"]),
         (&["evaluation.trials=0"], &["evaluation.trials = 0 is out of range: 1 to 100000"]),
         (&["dagger.rule=tau_onli"], &["dagger.rule", "no value \"tau_onli\"", "did you mean \"tau_only\"?"]),

@@ -152,6 +152,7 @@ fn no_route_is_explained_with_its_place_and_a_remedy() {
     let narrow = refusal(&lane("narrow", 2));
     assert!(narrow.contains("route: the passage near (30."), "{narrow}");
     assert!(narrow.contains("too narrow: about 1.8 m in the lot, and the car needs 2.36 m; widen it"), "{narrow}");
+    assert!(narrow.contains("leave specks out with drop_specks_m2 (--drop-specks of generate), enlarge"), "{narrow}");
 
     let mut lot = lane("turn", 5);
     lot.goal = Some([40.0, 3.5, 180.0]);
@@ -508,7 +509,7 @@ fn a_speck_becomes_the_smallest_island_or_is_left_out_as_asked() {
     let loaded = lot.scenario(&car()).unwrap();
     assert_eq!(loaded.notes, [Note::Padded { specks: 3 }]);
     let said = loaded.notes[0].to_string();
-    assert!(said.contains("drop_specks_m2 in NAME.lot.toml leaves out such specks"), "{said}");
+    assert!(said.contains("drop_specks_m2 (--drop-specks of cargo xtask generate) leaves out such specks"), "{said}");
     let sizes = areas(&loaded.scenario);
     assert_eq!(sizes.len(), 4);
     assert!(sizes.iter().all(|&area_m2| (0.0105..0.031).contains(&area_m2)), "{sizes:?}");

@@ -115,8 +115,8 @@ impl EvaluateArgs {
 #[derive(Debug, Clone, Args)]
 pub(crate) struct MethodArgs {
     /// Drivers that are trainings of one method, three or more, to be judged together as well: its name, and a pattern of
-    /// theirs (`*` stands for anything but a slash, `?` for one character); may be repeated. Trainings (`run:DIR`) that differ by
-    /// nothing but their seed are found without it, three or more that are of no method.
+    /// theirs (`*` stands for anything but a slash, `?` for one character); may be repeated. Three or more other trainings (`run:DIR`)
+    /// that differ by nothing but their seed are found without it.
     #[arg(long = "method", value_name = "NAME=DRIVERS")]
     pub(crate) methods: Vec<String>,
 }

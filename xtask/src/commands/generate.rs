@@ -15,9 +15,10 @@ use experiment::trials::{Purpose, Trial};
 use rayon::prelude::*;
 use report::drawn_lots::{DrawnLot, DrawnLots};
 use scenarios::import::{self, MapLot};
+use sim::collision::{BodyBox, ObstacleSet};
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
-use sim::scenario::Direction;
+use sim::scenario::{Direction, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
 use std::path::{Path, PathBuf};
@@ -81,6 +82,9 @@ pub(crate) struct MapArgs {
     /// Clearance that a route found automatically keeps around the body, metres in the lot [default: 0.25].
     #[arg(long, value_name = "METRES", allow_negative_numbers = true)]
     clearance: Option<f32>,
+    /// Takes occupied specks up to this size for free ground, m² in the lot: stray pixels of a scan.
+    #[arg(long, value_name = "M2", allow_negative_numbers = true)]
+    drop_specks: Option<f64>,
     /// Closes ways that leave the route with kerbs.
     #[arg(long)]
     close_branches: bool,
@@ -165,7 +169,8 @@ fn rejected_said(draws: u32) -> String {
 
 /// The lots named; of a map with the route the command line asks for.
 fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lot>> {
-    let MapArgs { scale, start, goal, is_loop, centre_line, clearance, close_branches, image_anywhere } = &args.map;
+    let MapArgs { scale, start, goal, is_loop, centre_line, clearance, drop_specks, close_branches, image_anywhere } =
+        &args.map;
     if args.map == MapArgs::default() {
         return Lot::parse_all(&args.lots, vehicle);
     }
@@ -182,6 +187,7 @@ fn lots(args: &GenerateArgs, vehicle: &VehicleSettings) -> anyhow::Result<Vec<Lo
     lot.scale = scale.unwrap_or(lot.scale);
     lot.is_image_anywhere = *image_anywhere;
     lot.close_branches |= close_branches;
+    lot.drop_specks_m2 = drop_specks.unwrap_or(lot.drop_specks_m2);
     // Where it goes, by the flags, or by the file.
     if goal.is_some() || *is_loop || centre_line.is_some() {
         (lot.goal, lot.is_loop, lot.centre_line) = (*goal, *is_loop, centre_line.clone());
@@ -198,6 +204,20 @@ fn drawn_lots(args: &GenerateArgs) -> DrawnLots<'_> {
     DrawnLots { out: &args.out, seed: args.seed, count: args.count, overwrite: args.overwrite }
 }
 
+/// Why a lot cannot be driven back: a route found for one way need not leave room to start at its finish, or to stand at its
+/// start the other way round.
+fn fault_on_the_way_back(scenario: &Scenario, vehicle: &VehicleSettings) -> Option<String> {
+    let map = match Map::build(scenario.clone().reversed(), vehicle) {
+        Ok(map) => map,
+        Err(error) => return Some(error.to_string()),
+    };
+    let end = map.path().pose_at(map.path().length_m());
+    let is_blocked = map.collision().body_hits(&BodyBox::new(vehicle), end, ObstacleSet::NonDrivable);
+    is_blocked.then(|| {
+        format!("the car does not fit at the finish, ({:.2}, {:.2}); leave room behind the start", end.x_m, end.y_m)
+    })
+}
+
 struct Made {
     attempts: Option<u32>,
     line: String,
@@ -209,10 +229,8 @@ fn write(args: &GenerateArgs, trial: &Trial<'_>) -> anyhow::Result<Made> {
     let toml = drawn_lots(args).write(&drawn, &vehicle, args.pixels_per_metre)?;
     let DrawnLot { map, attempts, .. } = drawn;
     let (length_m, obstacles) = (map.path().length_m(), map.scenario().obstacles.len());
-    // A route found for one way need not leave room at its finish to start back from there.
-    let back = Map::build(map.scenario().clone().reversed(), &vehicle);
-    let ways =
-        back.err().map_or(String::new(), |error| format!("; --directions forward only: on the way back, {error}"));
+    let ways = fault_on_the_way_back(map.scenario(), &vehicle)
+        .map_or_else(String::new, |fault| format!("; --directions forward only: on the way back, {fault}"));
     let obstacles = if obstacles == 1 { "1 obstacle".to_owned() } else { format!("{obstacles} obstacles") };
     let line = format!("{} and .png: route {length_m:.1} m, {obstacles}{ways}", toml.display());
     Ok(Made { attempts, line })
@@ -246,6 +264,18 @@ mod tests {
         let made = write_all(&args, &trials, &shares, &|_: &Made| {}).unwrap();
         assert_eq!((made.len(), shares.0.into_inner()), (1, vec![0.0, 1.0]));
         std::fs::remove_dir_all(out).unwrap();
+    }
+
+    /// A lot whose start stood close before a wall was said to be drivable both ways; every drive back ended at that wall.
+    #[test]
+    fn a_way_back_that_ends_at_a_wall_is_said() {
+        let vehicle = VehicleSettings::hyundai_hg300();
+        let fault = |wall_x_m: f32| {
+            let boundary = [(wall_x_m, -3.0), (62.0, -3.0), (62.0, 3.0), (wall_x_m, 3.0)];
+            fault_on_the_way_back(&Scenario::new("lane", boundary, [(0.0, 0.0), (40.0, 0.0)]), &vehicle)
+        };
+        assert_eq!(fault(-18.0), None);
+        assert!(fault(-2.0).is_some_and(|fault| fault.starts_with("the car does not fit at the finish, (")));
     }
 
     /// It said "0 of 9 draws rejected (0.0 %)", of which nobody knew what it means.
