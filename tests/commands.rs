@@ -167,6 +167,8 @@ fn settings_and_folders_that_cannot_be_used_leave_nothing() {
         let (_, stderr) = text(&output);
         assert_eq!(output.status.code(), Some(2), "{name}: {stderr}");
         assert!(stderr.contains(&format!("{name} is more than")), "{stderr}");
+        // It was refused where `--threads` decided, too.
+        succeed(xtask().args(["--threads", "1", "drivers"]).env(name, "1000000"));
     }
     let key = "expert@lot-b@forward@0@paper@1@9";
     for (flag, value) in [("--trial", "3"), ("--lots", "lot-a"), ("--noise", "clean"), ("--seed", "2")] {

@@ -235,6 +235,31 @@ fn results_that_lack_runs_are_not_those_of_an_evaluation() {
     assert!(error.contains("1 runs of the 2 that belong there"), "{error}");
 }
 
+/// What was driven on one lot was merged with what others drove on another one, without a word.
+#[test]
+fn lots_that_exchange_their_names_are_not_taken_for_each_other() {
+    let folder = scratch("exchanged-names");
+    let write = |file: &str, name: &str, length_m: u32| {
+        let lot = format!(
+            "name = \"{name}\"\nboundary = [[-18.0, -3.0], [34.0, -3.0], [34.0, 3.0], [-18.0, 3.0]]\n\
+             reference_path.points = [[0.0, 0.0], [{length_m}.0, 0.0]]\n"
+        );
+        std::fs::write(folder.join(file), lot).unwrap();
+    };
+    let evaluate = |driver: &str| {
+        let lots = ["--lots", "a.toml", "b.toml", "--trials", "1", "--out", driver];
+        succeed(xtask().current_dir(&folder).args(["evaluate", "--driver", driver]).args(lots));
+    };
+    write("a.toml", "short", 10);
+    write("b.toml", "long", 12);
+    evaluate("expert");
+    write("a.toml", "long", 10);
+    write("b.toml", "short", 12);
+    evaluate("vff");
+    let error = refuse(xtask().current_dir(&folder).args(["merge", "expert", "vff"]));
+    assert!(error.contains("lot \"short\" was a.toml, and is b.toml now"), "{error}");
+}
+
 /// A report that was written again under another name of its folder was not listed in its run, which was then damaged.
 #[test]
 fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
@@ -245,6 +270,8 @@ fn a_report_of_a_stage_is_listed_in_its_run_by_whatever_name() {
             .arg(&run),
     );
     succeed(xtask().current_dir(run.join("elsewhere")).args(["render", "report", "."]));
+    // It was called `.`.
+    assert!(std::fs::read_to_string(run.join("elsewhere/report.md")).unwrap().starts_with("# elsewhere\n"));
     let faults = sums::verify(&run).faults;
     assert!(faults.is_empty(), "{faults:?}");
 }
@@ -595,6 +622,15 @@ fn every_damage_of_every_file_is_noticed_by_who_reads_it_and_by_verify() {
         assert!(stderr.contains(file), "{command:?} does not name {file}: {stderr}");
         std::fs::write(run.join(file), whole).unwrap();
     }
+    // A bit flipped in the list, in the name of what not every report has: it was left out, without a word.
+    let list = std::fs::read_to_string(run.join(sums::FILE)).unwrap();
+    for name in ["table1.json", "summary.json", "elsewhere.md"] {
+        let flipped = format!("{}{}", char::from(name.as_bytes()[0] ^ 1), &name[1..]);
+        std::fs::write(run.join(sums::FILE), list.replace(name, &flipped)).unwrap();
+        let error = refuse(xtask().args(report));
+        assert!(error.contains(&format!("{name}: is not listed in sha256sums")), "{error}");
+    }
+    std::fs::write(run.join(sums::FILE), list).unwrap();
     let printed = succeed(xtask().args(verify));
     assert!(printed.contains("all as they were written"), "{printed}");
 }

@@ -183,6 +183,30 @@ fn a_report_is_written_and_an_interrupted_run_comes_to_the_same() {
     assert!(printed_again.contains("DAgger has fewer near-collisions"), "{printed_again}");
     assert_same_as_whole(&resumed, "after resuming");
 
+    let page = resumed.with_file_name("results.md");
+    let results = || {
+        succeed(xtask().args(["render", "results"]).arg(&resumed).arg("--to").arg(&page));
+        std::fs::read_to_string(&page).unwrap()
+    };
+    let expected = results();
+    // A flipped bit in the name of a training in the list, and its rows were gone from the page, without a word.
+    let list = std::fs::read_to_string(resumed.join(sums::FILE)).unwrap();
+    std::fs::write(resumed.join(sums::FILE), list.replace("s1-far-points/", "s1-far-pointr/")).unwrap();
+    assert!(results() == expected, "the page is another one");
+    std::fs::write(resumed.join(sums::FILE), list).unwrap();
+    // So they would be with a training that was deleted.
+    let (training, aside) = (resumed.join("chains/s1-far-points"), resumed.with_file_name("aside"));
+    std::fs::rename(&training, &aside).unwrap();
+    let missing = "chains/s1-far-points/sha256sums: cannot be read";
+    refused(&["render", "results"], &[&resumed, Path::new("--to"), &page], missing);
+    std::fs::rename(&aside, &training).unwrap();
+    // A stage that was driven in another run was shown as this run's.
+    let reference = resumed.join("drives/reference");
+    let wall_times = std::fs::read(reference.join("wall_time.jsonl")).unwrap();
+    sums::write(&reference, "wall_time.jsonl", b"").unwrap();
+    refused(&["render", "results"], &[&resumed, Path::new("--to"), &page], "drives/reference/sha256sums: is damaged");
+    sums::write(&reference, "wall_time.jsonl", &wall_times).unwrap();
+
     let again = xtask().args(["reproduce", "--resume"]).arg(&resumed).output().unwrap();
     assert_eq!(again.status.code(), Some(2));
     assert!(text(&again).1.contains("finished"), "{}", text(&again).1);
@@ -417,6 +441,9 @@ fn trainings_on_few_and_many_lots_end_in_one_table() {
     assert!(last.contains("](pictures/results/scaling-2.svg)"), "each plot has a file of its own: {last}");
     assert!(["scaling.svg", "scaling-2.svg"].iter().all(|plot| folder.join("pictures/results").join(plot).is_file()));
     refused(&["render", "results"], &[&folder.join("nowhere")], "nowhere: this is not a finished run of reproduce or");
+    let merged = out.with_file_name("merged");
+    sums::write(&merged.join("drives"), "wall_time.jsonl", b"").unwrap();
+    refused(&["render", "results", "--to"], &[&diary, &merged], "drives/sha256sums: is damaged");
     // And as a page of its own.
     let own = folder.join("results-scaling.md");
     succeed(xtask().args(["render", "results", &out_name, "--to"]).arg(&own));

@@ -1,6 +1,7 @@
 //! JSON files with a version.
 
 use anyhow::{Context as _, ensure};
+use experiment::manifest;
 use serde::Deserialize;
 use serde::de::DeserializeOwned;
 use sim::limits::RUN_TEXT_BYTES_MAX;
@@ -19,7 +20,11 @@ struct Version {
 /// # Errors
 /// If it is missing, damaged or of another version.
 pub fn read_versioned<T: DeserializeOwned>(path: &Path, schema: u32) -> anyhow::Result<Option<T>> {
-    let Some(text) = sums::read_if_listed(path, RUN_TEXT_BYTES_MAX)? else { return Ok(None) };
+    let (folder, name) = (path.parent().unwrap_or(Path::new("")), path.file_name().unwrap_or_default());
+    if !manifest::has_file(folder, &name.to_string_lossy())? {
+        return Ok(None);
+    }
+    let text = sums::read(path, RUN_TEXT_BYTES_MAX)?;
     let version = serde_json::from_slice::<Version>(&text).with_context(|| path.display().to_string())?;
     let found = version.schema;
     ensure!(

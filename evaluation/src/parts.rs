@@ -7,6 +7,7 @@ use crate::records::{self, RecordHeader};
 use anyhow::{Context as _, ensure};
 use experiment::run_dir::RunDir;
 use experiment::trials::Trial;
+use serde::Deserialize;
 use sim::limits::RUN_LINES_BYTES_MAX;
 use std::collections::btree_map::Entry;
 use std::collections::{BTreeMap, BTreeSet};
@@ -22,6 +23,15 @@ pub(crate) fn key(trial: &Trial<'_>) -> String {
     format!("{}@{}@{}", trial.lot.name(), trial.direction.name(), trial.index)
 }
 
+/// What says where a line belongs.
+#[derive(Deserialize)]
+struct Keyed {
+    #[serde(flatten)]
+    header: RecordHeader,
+    /// Of a wall time there is none.
+    replay: Option<String>,
+}
+
 /// What was driven of a whole: some of its trials, or all of them by some of its drivers.
 pub(crate) struct Part<'a> {
     pub(crate) folder: &'a Path,
@@ -35,8 +45,9 @@ impl Part<'_> {
         let mut rows = Vec::new();
         let mut seen = BTreeSet::new();
         let lines = sums::open(&path, RUN_LINES_BYTES_MAX)?;
-        records::each_line_at(&path, lines, |bytes, header: RecordHeader| {
-            let is_new = seen.insert(own.of(&header)?);
+        records::each_line_at(&path, lines, |bytes, Keyed { header, replay }| {
+            let place = replay.map_or_else(|| own.of(&header), |replay| own.of_drive(&header, &replay))?;
+            let is_new = seen.insert(place);
             ensure!(is_new || name == records::FAILURES, "there twice");
             rows.push((places.of(&header)?, bytes));
             Ok(())

@@ -5,6 +5,7 @@ use crate::plan::Plan;
 use crate::records::{self, FailureRecord, RecordHeader, RunRecord};
 use crate::results::EvaluationResults;
 use anyhow::{Context as _, ensure};
+use experiment::replay_key;
 use experiment::trials::Trial;
 use sim::scenario::Direction;
 use std::collections::BTreeMap;
@@ -38,7 +39,7 @@ impl EvaluationResults {
     /// # Errors
     /// If it was not written by this plan.
     pub(crate) fn take_run(&mut self, places: &Places<'_>, run: &RunRecord) -> anyhow::Result<()> {
-        let Place { level, driver, trial } = places.of(&run.header)?;
+        let Place { level, driver, trial } = places.of_drive(&run.header, &run.replay)?;
         self.add(level, driver, trial, &places.trials[trial], &run.report);
         Ok(())
     }
@@ -48,7 +49,7 @@ impl EvaluationResults {
     /// # Errors
     /// If it was not written by this plan.
     pub(crate) fn take_failure(&mut self, places: &Places<'_>, failure: &FailureRecord) -> anyhow::Result<()> {
-        let Place { level, driver, trial } = places.of(&failure.header)?;
+        let Place { level, driver, trial } = places.of_drive(&failure.header, &failure.replay)?;
         let is_again = incidents::is_again(failure.findings.since_resume_m);
         self.add_cause(level, driver, places.trials[trial].lot, failure.cause, is_again);
         Ok(())
@@ -94,5 +95,16 @@ impl<'a> Places<'a> {
                 .with_context(|| format!("another driver, {:?}", header.driver))?,
             trial: self.index_of.get(&key).copied().context("another run")?,
         })
+    }
+
+    /// The same of a line with a replay key. Two files may have exchanged the names of their lots.
+    ///
+    /// # Errors
+    /// If it is of another plan, or its lot lies in another file now.
+    pub(crate) fn of_drive(&self, header: &RecordHeader, replay: &str) -> anyhow::Result<Place> {
+        let place = self.of(header)?;
+        let (then, now) = (replay_key::lot_of(replay), self.trials[place.trial].lot.spec());
+        ensure!(then == now, "lot {:?} was {then}, and is {now} now", header.lot);
+        Ok(place)
     }
 }

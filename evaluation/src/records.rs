@@ -2,6 +2,7 @@
 
 use crate::incidents::{Cause, Findings};
 use anyhow::{Context as _, ensure};
+use experiment::manifest;
 use experiment::replay_key::ReplayKey;
 use experiment::settings::NoiseChoice;
 use serde::de::DeserializeOwned;
@@ -30,7 +31,7 @@ pub const WALL_TIME: &str = "wall_time.jsonl";
 /// If the folder holds none.
 pub fn of_finished(folder: &Path, file: &str) -> anyhow::Result<PathBuf> {
     ensure!(
-        sums::is_listed(folder, file)?,
+        manifest::has_file(folder, file)?,
         "{}: holds no finished evaluation; name the folder of one (cargo xtask evaluate), or of a training that ended with \
          its check",
         folder.display()

@@ -8,6 +8,7 @@ use experiment::settings::Settings;
 use experiment::shard::Shard;
 use sim::seed::RootSeed;
 use std::path::Path;
+use storage::sums;
 
 /// One step, with a folder of its own within the run.
 #[derive(Debug, Clone, PartialEq)]
@@ -89,6 +90,14 @@ impl Stage {
         }
         Ok(Some(self.tasks()))
     }
+}
+
+/// Refuses stages that were replaced since their run listed them: they may be whole, and another run's.
+///
+/// # Errors
+/// If one was, or a list is missing or damaged.
+pub fn ensure_of_run(stages: &[Stage], run: &Path) -> anyhow::Result<()> {
+    stages.iter().try_for_each(|stage| Ok(sums::check_folder(run, &stage.folder)?))
 }
 
 /// Loads drivers under their names in tables.

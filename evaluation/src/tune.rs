@@ -58,7 +58,9 @@ pub fn tune(
         let name = file_stem(&start.name);
         let candidates = format!("{name}.candidates.toml");
         let mut log = CandidateLog::read(run.path().join(&candidates), origin(settings, start, budget))?;
-        let Some(found) = search(&course, start, budget, evaluation.seed, &mut log, progress)? else { break };
+        let held = || run.ensure_held();
+        let Some(found) = search(&course, start, budget, evaluation.seed, &mut log, progress, &held)? else { break };
+        run.ensure_held()?;
         sums::list(run.path(), &[&candidates])?;
         progress.end(&format!(
             "{:.2} → {:.2} near-collisions and times stuck per 100 m",
@@ -304,7 +306,7 @@ fn round(value: f64) -> f64 {
     (value * 1e4).round() / 1e4
 }
 
-/// Searches around one planner; `None` if cancelled.
+/// Searches around one planner; `None` if cancelled. `held` fails where the folder has become another run's.
 fn search(
     course: &Course<'_>,
     Start { name, planner: start }: &Start,
@@ -312,7 +314,14 @@ fn search(
     seed: RootSeed,
     log: &mut CandidateLog,
     progress: &dyn Progress,
+    held: &dyn Fn() -> anyhow::Result<()>,
 ) -> anyhow::Result<Option<Found>> {
+    let drive = |candidates: &[PlannerSpec], stretch: &Stretch<'_>| {
+        let totals = course.drive(candidates, stretch)?;
+        // Before they are written there.
+        held()?;
+        Ok::<_, anyhow::Error>(totals)
+    };
     let finalists_max = FINALISTS.min(budget - 1) + 1;
     let runs_all = budget * course.search.trials.len() + finalists_max * course.fresh.trials.len();
     // The same draws for every planner, as far as their dimensions allow.
@@ -340,7 +349,7 @@ fn search(
         if tried.is_empty() {
             candidates[0] = start.clone();
         }
-        let totals = log.next(candidates.len(), || course.drive(&candidates, &course.search))?;
+        let totals = log.next(candidates.len(), || drive(&candidates, &course.search))?;
         tried.extend(
             generation.into_iter().zip(candidates).zip(totals).map(|((point, of), totals)| (point, of, totals)),
         );
@@ -350,7 +359,7 @@ fn search(
     order.truncate(finalists_max - 1);
     order.insert(0, 0);
     let finalists: Vec<PlannerSpec> = order.iter().map(|&index| tried[index].1.clone()).collect();
-    let fresh = log.next(finalists.len(), || course.drive(&finalists, &course.fresh))?;
+    let fresh = log.next(finalists.len(), || drive(&finalists, &course.fresh))?;
     let together: Vec<Totals> = order
         .iter()
         .zip(&fresh)
@@ -425,6 +434,7 @@ impl Found {
 mod tests {
     use super::*;
     use experiment::progress::Shares;
+    use std::cell::Cell;
 
     /// `tune --resume` went on with the candidates of any search that somebody had copied there.
     #[test]
@@ -464,12 +474,36 @@ mod tests {
         let reported = || {
             let shares = Shares::default();
             let mut log = CandidateLog::read(path.clone(), origin(&settings, start, 2)).unwrap();
-            search(&course, start, 2, settings.evaluation.seed, &mut log, &shares).unwrap().unwrap();
+            search(&course, start, 2, settings.evaluation.seed, &mut log, &shares, &|| Ok(())).unwrap().unwrap();
             shares.0.into_inner()
         };
         let driven = reported();
         assert!(driven.len() > 2 && driven[0] == 0.0 && driven.is_sorted(), "{driven:?}");
         assert_eq!(reported(), [1.0]);
+        std::fs::remove_file(path).unwrap();
+    }
+
+    /// A search whose folder was deleted and begun again by another went on to its end, and listed its candidates there.
+    #[test]
+    fn a_search_ends_where_its_folder_is_another_runs() {
+        let path = std::env::temp_dir().join(format!("evaluation-test-{}-held.candidates.toml", std::process::id()));
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.evaluation.trials = 1;
+        let lots = Lot::parse_all(&["train:1:easy"], &settings.episode.vehicle).unwrap();
+        let course = Course::new(&settings, &lots, NoiseChoice::Clean).unwrap();
+        let start = &planners_named(&["cvm".to_owned()]).unwrap()[0];
+        let mut log = CandidateLog::read(path.clone(), origin(&settings, start, 2)).unwrap();
+        let times_asked = Cell::new(0);
+        let held = || {
+            times_asked.set(times_asked.get() + 1);
+            ensure!(times_asked.get() < 2, "it is another run's");
+            Ok(())
+        };
+        let seed = settings.evaluation.seed;
+        let refused = search(&course, start, 2, seed, &mut log, &Shares::default(), &held).unwrap_err();
+        assert_eq!(refused.to_string(), "it is another run's");
+        let written = CandidateLog::read(path.clone(), origin(&settings, start, 2)).unwrap().totals.len();
+        assert_eq!(written, 2, "what the finalists did is not written");
         std::fs::remove_file(path).unwrap();
     }
 

@@ -305,6 +305,15 @@ pub fn is_finished(path: &Path) -> anyhow::Result<bool> {
     Ok(finished(path)?.is_some())
 }
 
+/// Whether a file of a run is to be read: the run lists it, or should. All that a finished run wrote is listed; what is there
+/// and is not, whoever reads it refuses by name.
+///
+/// # Errors
+/// If the list cannot be read; see [`finished`].
+pub fn has_file(run: &Path, name: &str) -> anyhow::Result<bool> {
+    Ok(sums::is_listed(run, name)? || run.join(name).exists() && is_finished(run)?)
+}
+
 /// What is said of an input that is not what a run was begun with.
 pub(crate) fn has_changed(name: &str) -> anyhow::Error {
     anyhow!("{name}: changed since this run was begun; restore it, or begin again into another folder")

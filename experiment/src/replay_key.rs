@@ -107,6 +107,11 @@ pub fn driver_of(key: &str) -> String {
     unescaped(key.split('@').next().unwrap_or_default())
 }
 
+/// The lot of a key that is written down, as it was named.
+pub fn lot_of(key: &str) -> String {
+    unescaped(key.split('@').nth(1).unwrap_or_default())
+}
+
 fn escaped(name: &str) -> String {
     name.replace('%', "%25").replace('@', "%40").replace(' ', "%20")
 }
@@ -141,6 +146,7 @@ mod tests {
                     let text = key.to_string();
                     assert_eq!(text.parse::<ReplayKey>().unwrap(), key, "{text}");
                     assert!(!text.contains(' '), "{text}");
+                    assert_eq!(lot_of(&text), lot);
                 }
             }
         }

@@ -49,7 +49,7 @@ pub struct Place<'a> {
     pub build: &'a Build,
     /// The folder; `None`: the next free one in `runs/`.
     pub out: Option<&'a Path>,
-    /// Whether to delete what an earlier run left there.
+    /// Whether to delete the folder of an earlier run there, with all that it holds.
     pub overwrite: bool,
     /// The command, as part of the folder's name.
     pub command: &'a str,

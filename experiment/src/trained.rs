@@ -58,6 +58,14 @@ pub fn policy_folder(spec: &Path) -> anyhow::Result<PathBuf> {
              again into another folder",
             run.display()
         );
+        // With that line lost from the list, the network of the last round would drive in its place.
+        let has_final = settings_of(spec).is_ok_and(|settings| settings.dagger.final_fit().is_some());
+        ensure!(
+            !has_final || folders.contains(&"final"),
+            "{}: does not list final/{}, the network of the final training; restore the file, or train again",
+            run.join(sums::FILE).display(),
+            sums::FILE
+        );
     }
     folders.sort_by_key(|folder| (*folder == "final", round_of(folder)));
     let folder = if is_bc { folders.first() } else { folders.last() };
@@ -262,7 +270,9 @@ mod tests {
     use crate::run_dir::RunDir;
     use crate::test_runs::{create, message, place, scratch};
     use policy::conditions::Conditions;
+    use policy::dagger::Stop;
     use policy::decision_rule::DecisionRule;
+    use policy::fit::Budget;
     use policy::network::Weights;
     use std::fs;
 
@@ -402,6 +412,26 @@ mod tests {
         fs::write(path.join(sums::FILE), list).unwrap();
         fs::remove_dir_all(&of_last[2]).unwrap();
         assert!(message(driving_folders(&path)).contains("round-01-member-2/sha256sums"));
+        fs::remove_dir_all(path).unwrap();
+    }
+
+    /// A flipped bit in the list, in the name `final`, made `run:DIR` the network of the last round, without a word.
+    #[test]
+    fn a_training_that_ends_with_a_final_one_never_drives_with_its_last_round() {
+        let path = scratch("lost-final");
+        let mut settings = Settings::preset("smoke").unwrap();
+        settings.dagger.final_budget = Budget::Steps(3);
+        let run = RunDir::create(&place(&path, false), &settings, &Request::default()).unwrap();
+        let checkpoint = two_rounds(&path, &settings);
+        checkpoint.save(&path.join("final")).unwrap();
+        sums::list(&path, &["final/sha256sums"]).unwrap();
+        run.finish(Outcome::Training { stop: Stop::IterationCap, rounds: 2 }).unwrap();
+        assert_eq!(policy_folder(&path).unwrap(), path.join("final"));
+        let list = fs::read_to_string(path.join(sums::FILE)).unwrap();
+        fs::write(path.join(sums::FILE), list.replace("final/", "finel/")).unwrap();
+        let refused = message(policy_folder(&path));
+        assert!(refused.contains("sha256sums: does not list final/sha256sums"), "{refused}");
+        drop(run);
         fs::remove_dir_all(path).unwrap();
     }
 

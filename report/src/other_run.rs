@@ -6,7 +6,7 @@ use crate::page::{Image, Page};
 use crate::trainings_table::TrainingsTable;
 use crate::{deviations, rules, scaling};
 use anyhow::{bail, ensure};
-use evaluation::shards;
+use evaluation::{shards, stage};
 use experiment::command_line::command_line;
 use experiment::manifest::{self, Manifest};
 use experiment::trained;
@@ -111,16 +111,19 @@ fn judged(command: &str, manifest: &Manifest, root: &Path) -> anyhow::Result<(&'
     Ok(match command {
         "deviations" => {
             let stages = evaluation::deviations::stages(&settings, &arguments.try_into()?, root)?;
+            stage::ensure_of_run(&stages, root)?;
             (deviations::TITLE, deviations::table(&stages, root)?)
         }
         "rules" => {
             let extent = arguments.try_into()?;
             let stages = evaluation::rules::stages(&settings, &extent, root);
+            stage::ensure_of_run(&stages, root)?;
             (rules::TITLE, rules::table(&settings, &extent, &stages, root)?)
         }
         _ => {
             let extent = arguments.try_into()?;
             let stages = evaluation::scaling::stages(&settings, &extent, root);
+            stage::ensure_of_run(&stages, root)?;
             (scaling::TITLE, scaling::table(&settings, &extent, &stages, root)?)
         }
     })

@@ -20,7 +20,7 @@ use evaluation::summary::{Row, SweepRow, Tables};
 use evaluation::table1::Table1;
 use experiment::command_line::{command_line, quoted, quoted_path};
 use experiment::lots::ALL;
-use experiment::manifest::Manifest;
+use experiment::manifest::{self, Manifest};
 use experiment::progress::{Interrupted, Progress};
 use experiment::run_dir::RunDir;
 use experiment::settings::{NoiseChoice, Settings};
@@ -87,7 +87,7 @@ impl Sources {
             manifest: Manifest::read(folder)?,
             training: Training::read(folder)?,
             evaluation: Evaluation::read(folder)?,
-            elsewhere: sums::is_listed(folder, ELSEWHERE)?.then(|| text(&folder.join(ELSEWHERE))).transpose()?,
+            elsewhere: manifest::has_file(folder, ELSEWHERE)?.then(|| text(&folder.join(ELSEWHERE))).transpose()?,
         })
     }
 }
@@ -198,10 +198,16 @@ impl Report {
     }
 }
 
+/// The name of a folder, as which it may not have been named: `.`.
+fn name_of(folder: &Path) -> String {
+    let place = if folder.file_name().is_none() { storage::place_of(folder).ok() } else { None };
+    let place = place.as_deref().unwrap_or(folder);
+    place.file_name().map_or_else(|| place.display().to_string(), |name| name.to_string_lossy().into_owned())
+}
+
 fn report(folder: &Path, progress: &dyn Progress) -> anyhow::Result<Report> {
     let sources = Sources::read(folder)?;
-    let name = folder.file_name().map_or_else(|| folder.display().to_string(), |name| name.to_string_lossy().into());
-    let mut page = Page::new(name);
+    let mut page = Page::new(name_of(folder));
     let mut not_replayed = Vec::new();
     overview(&mut page, &sources);
     if let Some(training) = &sources.training {

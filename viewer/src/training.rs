@@ -5,6 +5,7 @@ use crate::layout;
 use crate::recording::Recording;
 use crate::shapes::color;
 use anyhow::ensure;
+use experiment::manifest;
 use policy::dataset::Collection;
 use policy::fit::FitReport;
 use rerun::{SeriesLines, SeriesPoints, TextDocument};
@@ -61,7 +62,8 @@ pub(crate) fn show(run: &Path, recording: &Recording) -> anyhow::Result<()> {
     }
     ensure!(rounds > 0, "{}: no round is finished there; runs of train-bc and train-dagger have rounds", run.display());
     for (entity, name) in layout::TABLES {
-        let table = sums::read_if_listed(&run.join(name), RUN_TEXT_BYTES_MAX)?;
+        let read = || sums::read(&run.join(name), RUN_TEXT_BYTES_MAX);
+        let table = manifest::has_file(run, name)?.then(read).transpose()?;
         let text = table.map_or_else(
             || format!("This run has no `{name}` yet."),
             |table| String::from_utf8_lossy(&table).into_owned(),

@@ -90,7 +90,7 @@ pub(crate) struct OutArgs {
     /// Folder of the run [default: runs/COMMAND-PRESET-sSEED, the next free one].
     #[arg(long, value_name = "DIR", value_parser = run_folder())]
     pub(crate) out: Option<PathBuf>,
-    /// Deletes what an earlier run left in `--out`.
+    /// Deletes the folder of an earlier run in `--out`, with all that it holds.
     #[arg(long, requires = "out")]
     pub(crate) overwrite: bool,
 }

@@ -86,9 +86,12 @@ fn with_negative_numbers(command: Command) -> Command {
 
 fn run(cli: &cli::Cli) -> anyhow::Result<()> {
     // What rayon reads where no number is given; the second is its old name.
-    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"] {
+    for name in ["RAYON_NUM_THREADS", "RAYON_RS_NUM_CPUS"].iter().filter(|_| cli.threads() == 0) {
         let asked_for = std::env::var(name).ok().and_then(|number| number.parse::<u64>().ok());
-        ensure!(asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)), "{name} is more than {THREADS_MAX}");
+        ensure!(
+            asked_for.is_none_or(|threads| threads <= u64::from(THREADS_MAX)),
+            "{name} is more than {THREADS_MAX}; lower it, or give --threads"
+        );
     }
     rayon::ThreadPoolBuilder::new()
         .num_threads(cli.threads())

@@ -18,6 +18,7 @@ use scenarios::import::{self, MapLot};
 use sim::collision::{BodyBox, ObstacleSet};
 use sim::limits::TRIAL_MAX;
 use sim::map::Map;
+use sim::metrics::MetricsSettings;
 use sim::scenario::{Direction, Scenario};
 use sim::seed::RootSeed;
 use sim::vehicle::VehicleSettings;
@@ -212,7 +213,13 @@ fn fault_on_the_way_back(scenario: &Scenario, vehicle: &VehicleSettings) -> Opti
         Err(error) => return Some(error.to_string()),
     };
     let end = map.path().pose_at(map.path().length_m());
-    let is_blocked = map.collision().body_hits(&BodyBox::new(vehicle), end, ObstacleSet::NonDrivable);
+    let (body, near_m) = (BodyBox::new(vehicle), MetricsSettings::paper().near_collision_m);
+    // Every drive would be stopped before what is nearer than that.
+    let hits = |ahead_m: f32| {
+        let pose = end.advanced_along_arc(0.0, ahead_m);
+        map.collision().body_hits(&body, pose, ObstacleSet::NonDrivable)
+    };
+    let is_blocked = [0.0, 0.5 * near_m, near_m].into_iter().any(hits);
     is_blocked.then(|| {
         format!("the car does not fit at the finish, ({:.2}, {:.2}); leave room behind the start", end.x_m, end.y_m)
     })
@@ -275,7 +282,12 @@ mod tests {
             fault_on_the_way_back(&Scenario::new("lane", boundary, [(0.0, 0.0), (40.0, 0.0)]), &vehicle)
         };
         assert_eq!(fault(-18.0), None);
-        assert!(fault(-2.0).is_some_and(|fault| fault.starts_with("the car does not fit at the finish, (")));
+        // The bumper comes to x = −3.80 m, and is stopped 0.5 m before a wall.
+        assert_eq!(fault(-4.5), None);
+        for wall_x_m in [-4.1, -2.0] {
+            let fault = fault(wall_x_m).expect("it is blocked");
+            assert!(fault.starts_with("the car does not fit at the finish, ("), "{fault}");
+        }
     }
 
     /// It said "0 of 9 draws rejected (0.0 %)", of which nobody knew what it means.

@@ -42,7 +42,6 @@ use sim::sensing::Inspection;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use storage::sums;
 
 pub(crate) const EXAMPLES: &str = "\
 Examples:
@@ -482,9 +481,9 @@ fn render_report(run: &Path, overwrite: bool, copy: Option<&Folder<'_>>, output:
     );
     let owned = RunDir::reopen(run, "render report")?;
     // What else has a report wrote it itself, of its stages, and would lose it.
-    let is_listed = |name| sums::is_listed(run, name);
+    let has_file = |name| manifest::has_file(run, name);
     ensure!(
-        is_listed("dagger.toml")? || is_listed("runs.jsonl")?,
+        has_file("dagger.toml")? || has_file("runs.jsonl")?,
         "{}: this is neither a training nor an evaluation; name one of its folders, or see render results --help",
         run.display()
     );

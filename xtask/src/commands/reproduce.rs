@@ -24,7 +24,6 @@ use experiment::shard::Shard;
 use experiment::trained;
 use planners::PlannerSpec;
 use report::reproduction::{self, Recipe};
-use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 use storage::sums;
 
@@ -260,9 +259,11 @@ pub(crate) fn recipe_of(path: &Path) -> anyhow::Result<Recipe> {
     let settings = trained::settings_of(path)?;
     let Arguments { extent, shard } = Arguments::read(path, Manifest::read(path)?)?;
     ensure!(shard.is_none(), "{}: this is a shard, which has no report; put all together with merge", path.display());
-    let trained: BTreeSet<String> = sums::names(path)?.into_iter().collect();
-    let is_there = |folder: &str| trained.contains(&format!("{folder}/{}", sums::FILE));
+    // By either: of a line that the list lost, or a folder that is gone, rows of tables would vanish without a word.
+    let listed = sums::names(path)?;
+    let is_there = |folder: &str| path.join(folder).exists() || listed.contains(&format!("{folder}/{}", sums::FILE));
     let stages = stages::without_trainings(stages::all(&settings, &extent, path)?, is_there);
+    stage::ensure_of_run(&stages, path)?;
     let stages = perform::with_those_who_drove(stages, path)?;
     Ok(Recipe { settings, extent, stages })
 }
