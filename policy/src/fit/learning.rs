@@ -4,6 +4,7 @@ use crate::files::{FileError, RESTORE_REMEDY, write_atomically};
 use crate::fit::report::{FitReport, Step};
 use serde::{Deserialize, Serialize};
 use sim::limits::RUN_LINES_BYTES_MAX;
+use std::io::Read;
 use std::path::Path;
 use storage::sums;
 
@@ -69,16 +70,28 @@ pub fn read(folder: &Path, name: &str) -> Result<Option<LearningCurve>, FileErro
         return Ok(None);
     }
     let path = folder.join(FILE);
-    let mut curve = LearningCurve { name: name.to_owned(), ..LearningCurve::default() };
+    let of_rows = curve_of(sums::open(&path, RUN_LINES_BYTES_MAX)?);
+    let curve = of_rows.map_err(|error| match error.kind() {
+        csv::ErrorKind::Io(error) => FileError::unreadable(&path, error, RESTORE_REMEDY),
+        _ => FileError::new(&path, error, RESTORE_REMEDY),
+    })?;
+    Ok(Some(LearningCurve { name: name.to_owned(), ..curve }))
+}
+
+fn curve_of(file: impl Read) -> csv::Result<LearningCurve> {
+    let mut curve = LearningCurve::default();
     let mut training = Thinned::new(POINTS_MAX);
-    for row in csv::Reader::from_reader(sums::open(&path, RUN_LINES_BYTES_MAX)?).deserialize() {
-        let row: Row = row.map_err(|error| FileError::new(&path, error, RESTORE_REMEDY))?;
+    let mut rows = csv::Reader::from_reader(file);
+    // `deserialize` takes a file whose first bytes cannot be read for an empty one.
+    rows.headers()?;
+    for row in rows.deserialize() {
+        let row: Row = row?;
         training.push(row.step, f64::from(row.loss));
         curve.validation.extend(row.validation_loss.map(|loss| (row.step, f64::from(loss))));
         curve.validation_rmse_m.extend(row.validation_rmse_m.map(|error_m| (row.step, f64::from(error_m))));
     }
     curve.training = training.finish();
-    Ok(Some(curve))
+    Ok(curve)
 }
 
 /// Points of a curve that are held, an even number: no picture shows as many.
@@ -145,6 +158,18 @@ mod tests {
         assert_eq!(thinned(8), [(2, 1.5), (4, 3.5), (6, 5.5), (8, 7.5)]);
         assert_eq!(thinned(18), [(4, 2.5), (8, 6.5), (12, 10.5), (16, 14.5), (18, 17.5)]);
         assert_eq!(thinned(1000).len(), 8, "the last stretch of 128 is shorter");
+    }
+
+    /// A report was written without the curve, and said nothing.
+    #[test]
+    fn a_curve_that_a_failing_disk_does_not_give_is_no_empty_one() {
+        struct Failing;
+        impl Read for Failing {
+            fn read(&mut self, _: &mut [u8]) -> std::io::Result<usize> {
+                Err(std::io::Error::other("the disk fails"))
+            }
+        }
+        assert!(curve_of(Failing).unwrap_err().to_string().contains("the disk fails"));
     }
 
     #[test]
